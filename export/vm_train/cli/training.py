@@ -15,6 +15,8 @@ from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.field.uprights import KINDS
+from vm_embedded.files import exists
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_workstation.worker_process import check_shared_memory
@@ -141,6 +143,8 @@ def _begin(
         training = f"{source.epoch} an epoch of {len(source.shards)} shards"
     parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
     print(f"{options.data}: {len(good)} pictures: {parts}")
+    if remark := _without_bases(configuration, good, source is not None):
+        print(f"vm-train: {remark}", file=sys.stderr)
     unpacked = None if options.no_unpacked else options.unpacked or options.output / UNPACKED
     data = TrainingData(options.data, split, unpacked, source)
     run = begin_run(options.output, data, configuration, start)
@@ -150,6 +154,16 @@ def _begin(
             "class gets as many as the rarest object; training.selection=all uses all points",
             file=sys.stderr,
         )
+
+
+def _without_bases(configuration: TrainConfiguration, pictures: Sequence[PictureFiles], is_streamed: bool) -> str:
+    """A remark if pictures don't tell where the uprights stand whose bases the network should learn; else ""."""
+    names = [each for each in configuration.manifest.peaks if each in KINDS]
+    missing = len(pictures) if is_streamed else sum(not exists(each.scene) for each in pictures)
+    if not names or not missing:
+        return ""
+    which = "streamed pictures have no scene files" if is_streamed else f"{missing} pictures have no sceneX.json"
+    return f"{which}: from them, the network does not learn where the base of a {' or '.join(names)} is"
 
 
 def _split(options: argparse.Namespace, configuration: TrainConfiguration, good: Sequence[PictureFiles]) -> Split:

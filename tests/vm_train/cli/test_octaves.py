@@ -1,6 +1,7 @@
 """A network on mesh octaves from a configuration to detections, with commands as a user types them."""
 
 import json
+import shutil
 import signal
 
 import numpy as np
@@ -116,3 +117,17 @@ def test_entries_without_effect_and_wrong_widths_are_refused(entry, said, data, 
     assert said in done.stderr
     assert done.stderr.startswith("vm-train: ")
     assert not (tmp_path / "run").exists()
+
+
+def test_pictures_that_leave_bases_unknown_are_a_remark(data, tmp_path):
+    shutil.copytree(data, tmp_path / "data")
+    for scene in sorted((tmp_path / "data").glob("scene*.json"))[:4]:
+        scene.unlink()
+    path = tmp_path / "train.toml"
+    posts = CLASSES.replace('line = { kind = "area"', 'goal = { kind = "upright"')
+    path.write_text(posts + OCTAVES.replace("epochs = 3\nlooks = 2", "epochs = 1"))
+    done = run(tmp_path / "data", "-o", tmp_path / "run", "--config", path, *ONE)
+    assert "vm-train: 4 pictures have no sceneX.json: from them, the network does not learn" in done.stderr
+    assert "the base of a goal" in done.stderr
+    shape = Checkpoint.load(tmp_path / "run" / "model.pt").network.shape
+    assert (shape.classes, shape.peaks) == (4, 2)
