@@ -53,7 +53,7 @@ def _decode_whole(content: bytes, flags: int) -> npt.NDArray[np.generic]:
 def _decode_jpeg(content: bytes, flags: int) -> npt.NDArray[np.generic]:
     content, had_end = complete(content)
     image, warnings = _decode(content, flags)
-    if not had_end and (warnings or is_progressive(content)):
+    if not had_end and (image is None or warnings or is_progressive(content)):
         raise InputError("is cut short")
     if warnings:
         check_damage(content, warnings[0])
