@@ -28,7 +28,7 @@ help: ## list the targets
 setup: .venv/dev ## install everything for development: runtime, torch, tests
 
 demo: .venv/runtime ## find balls and field features in the twelve test pictures
-	@$(BIN)/vm-detect --model soccer --camera $(DEMO) --save-overlay demo-out
+	@$(BIN)/vm-detect --model soccer --camera $(DEMO) --no-json --save-overlay demo-out
 	@echo "Annotated pictures: $(CURDIR)/demo-out/"
 
 test: lint ## lint and tests (10 to 15 minutes); LONG=1 adds the long ones (40 to 70 minutes): camera faults, a booted robot

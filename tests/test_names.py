@@ -177,7 +177,7 @@ def test_a_bad_name_in_a_folder_of_boxes_is_refused_or_cleaned(name, tmp_path):
         else:
             assert set(found.names) <= {" ".join(name.split())}
             assert not any(map(name_fault, found.names))
-            assert found.names or found.faults
+            assert found.names or found.findings
 
 
 @good_names

@@ -102,7 +102,7 @@ struct Circle {
 struct Crossing {
     char kind = '?';  // L, T or X
     Pair position{};
-    float heading = 0.0F;
+    float heading = 0.0F, confidence = 0.0F;
 };
 
 struct BorderPoint {
@@ -142,7 +142,7 @@ struct ProtocolError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-constexpr std::uint8_t version = 2;                   // of the binary form
+constexpr std::uint8_t version = 3;                   // of the binary form
 constexpr std::size_t header_bytes = 64;
 constexpr std::size_t most_bytes = std::size_t{4} << 20;  // a frame full of lines takes a few kilobytes
 
@@ -234,6 +234,7 @@ inline Crossing crossing(Cursor& from) {
     made.kind = static_cast<char>(from.take<std::uint32_t>());
     made.position = from.floats<2>();
     made.heading = from.take<float>();
+    made.confidence = from.take<float>();
     return made;
 }
 
@@ -284,7 +285,7 @@ inline Message decode(const std::uint8_t* data, std::size_t size) {
     frame.total_ms = head.take<float>();
 
     // detections, posts, goals, robots, lines, circle, crossings, border
-    constexpr std::array<std::size_t, 8> record_bytes{96, 44, 8, 44, 36, 20, 16, 16};
+    constexpr std::array<std::size_t, 8> record_bytes{96, 44, 8, 44, 36, 20, 20, 16};
     const auto counts = head.take<std::array<std::uint16_t, 8>>();
     const std::size_t text_bytes = head.take<std::uint16_t>();
     std::size_t expected = header_bytes + text_bytes;

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import math
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Image
+from vm_embedded.arrays import Floats, Image, Singles
 from vm_embedded.errors import InputError, unknown
 
 FEWEST_CORNERS = 8
 """Fewest corners of a ChArUco board that count as found: its pose has six numbers, from two for each corner."""
+
+_FEWEST_MARKERS, _MOST_COLUMNS = 6, 40
+"""Markers from which the size of a board can be told, and the most columns to try."""
+
+_WELL = 0.3
+"""Largest median error of the corners of markers on a board that fits, as a share of a marker's side."""
 
 _FIND = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
 
@@ -100,10 +109,35 @@ class CharucoBoard:
         margin = (1.0 - self.marker / self.square) / 2.0  # beyond it there are edges of the markers
         return Corners(places, _refined(gray, pixels.reshape(-1, 2).astype(np.float64), margin))
 
+    def marker_count(self, gray: Image) -> int:
+        """The number of markers of the dictionary in a picture."""
+        return len(self._markers_in(gray)[1])
+
     def other_size(self, gray: Image) -> str | None:
-        """What the markers of a picture say about a wrong option, or None without any marker."""
-        _, _, _, markers = self._detector.detectBoard(gray)
-        return None if markers is None or not len(markers) else f"{len(markers)} markers"
+        """The size of another board that fits the markers of a picture, as "9x6" or "9x6 --legacy", or None."""
+        corners, numbers = self._markers_in(gray)
+        if len(numbers) < _FEWEST_MARKERS:
+            return None
+        pixels, count = np.concatenate(corners).reshape(-1, 2).astype(np.float64), int(numbers.max()) + 1
+        fits = []
+        for columns in range(3, _MOST_COLUMNS + 1):
+            rows = max(-(-2 * count // columns), 3)
+            if columns * rows // 2 < count or columns * rows // 2 > len(self.markers.bytesList):
+                continue
+            for legacy, doubt in ((self.legacy, 1.0), (not self.legacy, 2.0)):  # both may fit, if markers are hidden
+                board = replace(self, columns=columns, rows=rows, legacy=legacy)
+                places = np.concatenate([board.marker_corners()[each] for each in numbers])
+                fits.append((doubt * _misfit(places, pixels), board))
+        error, best = min(fits, key=lambda each: each[0], default=(math.inf, self))
+        if best == self or error > _WELL * self.marker:
+            return None
+        change = "" if best.legacy == self.legacy else " --legacy" if best.legacy else " without --legacy"
+        return f"{best.columns}x{best.rows}{change}"
+
+    def _markers_in(self, gray: Image) -> tuple[Sequence[Singles], npt.NDArray[np.int32]]:
+        """Corners of the visible markers (1, 4, 2) [px], and their numbers (n,)."""
+        _, _, corners, numbers = self._detector.detectBoard(gray)
+        return (corners, numbers.ravel()) if numbers is not None else ([], np.zeros(0, dtype=np.int32))
 
 
 Board = Chessboard | CharucoBoard
@@ -140,6 +174,15 @@ DICTIONARIES = tuple(
     sorted(name.removeprefix("DICT_") for name in dir(cv2.aruco) if name.startswith("DICT_") and name == name.upper())
 )
 """Names of the marker dictionaries of OpenCV."""
+
+
+def _misfit(places: Floats, pixels: Floats) -> float:
+    """Median error [m] of places (n, 2) on a board that a plane's picture has at pixels (n, 2)."""
+    plane, _ = cv2.findHomography(pixels, places)
+    if plane is None:
+        return math.inf
+    there = cv2.perspectiveTransform(pixels[:, None], plane)[:, 0]
+    return float(np.median(np.linalg.norm(there - places, axis=1)))
 
 
 def _refined(gray: Image, pixels: Floats, reach: float) -> Floats:

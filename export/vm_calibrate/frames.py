@@ -164,10 +164,12 @@ def _nothing_found(source: str, board: Board, count: int, sharpest: Image) -> st
     where = f"none of {count} frames of {Path(source).name}" if count > 1 else f"no frame of {Path(source).name}"
     other = board.other_size(sharpest)
     if isinstance(board, CharucoBoard):
-        if other is not None:
+        count = board.marker_count(sharpest)
+        if count:
+            advice = f"try --board {other}" if other is not None else "check --board, and try --legacy"
             return (
-                f"{where} shows a ChArUco board of {board.columns}x{board.rows} squares, but {other} of "
-                f"{board.dictionary} are visible; check --board, which counts squares, and try --legacy"
+                f"{where} shows a ChArUco board of {board.columns}x{board.rows} squares, but {count} markers of "
+                f"{board.dictionary} are visible; --board counts squares: {advice}"
             )
         return (
             f"{where} shows a marker of {board.dictionary}; check --charuco, light, and that markers are large enough"

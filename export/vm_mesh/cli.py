@@ -11,6 +11,7 @@ from typing import Any
 from vm_embedded.cli.program import Parser, program
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.network.bundled import DEFAULT
 from vm_workstation.commands import Commands, run_command
 
 _EPILOG = "Exit status: 0 done, 1 not done (standard error says why), 2 wrong usage, 130 interrupted."
@@ -85,16 +86,17 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
             action="append",
             metavar="NAME",
             help="mesh model; "
-            + ("repeatable; default: all models for the shape" if several else "default: from --network, or ring6"),
+            + ("repeatable; default: all models for the shape" if several else "default: that of --network"),
         )
     plan = made.add_argument_group("object, camera and reach")
     plan.add_argument(
         "--network",
         metavar="FILE",
-        help="take the defaults of this group from a network: an .onnx file, or the name of one in the package",
+        help="take the defaults of this group from a network: an .onnx file, or the name of one in the package; "
+        f"default {DEFAULT}, as for vm-detect",
     )
-    plan.add_argument("--shape", choices=tuple(SHAPES), help="shape of the object; default sphere")
-    plan.add_argument("--radius", type=float, metavar="M", help="radius of the object [m]; default 0.095")
+    plan.add_argument("--shape", choices=tuple(SHAPES), help="shape of the object")
+    plan.add_argument("--radius", type=float, metavar="M", help="radius of the object [m]")
     plan.add_argument(
         "--object-height", type=float, metavar="M", help="height of the object [m]; only a cylinder takes it"
     )
@@ -104,13 +106,13 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
         help="height of the camera [m]; default: " + ("1" if command == "quality" else "from the lens file, or 1"),
     )
     plan.add_argument(
-        "--intersections", type=float, metavar="K", help="rings of points across an object (the paper's k); default 4"
+        "--intersections", type=float, metavar="K", help="rings of points across an object (the paper's k)"
     )
     plan.add_argument(
         "--max-distance",
         type=float,
         metavar="M",
-        help="reach of the mesh on the plane [m]; default 10",
+        help="reach of the mesh on the plane [m]",
     )
     return made
 

@@ -18,26 +18,23 @@ from vm_embedded.geometry.lens_files import LensFile, read_lens_file
 from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.bundled import model_path
+from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.model_file import read_model
 
 from .built_mesh import MeshPlan
 
-_DEFAULTS = {"shape": "sphere", "radius": 0.095, "object_height": 0.0, "intersections": 4.0, "max_distance": 10.0}
+_ENTRIES = ("shape", "radius", "object_height", "intersections", "max_distance")
+"""Entries of a mesh that a network has."""
 
 
 def plan_and_model(options: argparse.Namespace, file: LensFile | None) -> tuple[MeshPlan, str]:
-    """The plan of the mesh, and the model of --network or ring6.
+    """The plan of the mesh, and the model of --network, or of the network that vm-detect uses without --model.
 
-    An option comes before the entry of --network, and that before the default. The height comes from --height, the lens
+    An option comes before the entry of the network. The height comes from --height, the lens
     file, or is 1 m. Raises InputError, ModelError or GeometryError for entries that do not fit.
     """
-    entries: dict[str, Any] = dict(_DEFAULTS)
-    model = "ring6"
-    if options.network is not None:
-        manifest = read_model(model_path(options.network)).manifest
-        entries |= {name: getattr(manifest, name) for name in entries}
-        model = manifest.mesh
+    manifest = read_model(model_path(options.network or DEFAULT)).manifest
+    entries: dict[str, Any] = {name: getattr(manifest, name) for name in _ENTRIES}
     given = {name: getattr(options, name) for name in entries}
     if given["shape"] not in (None, "cylinder"):
         entries["object_height"] = 0.0  # the network may be for a cylinder
@@ -57,7 +54,7 @@ def plan_and_model(options: argparse.Namespace, file: LensFile | None) -> tuple[
     )
     if not isinstance(shape, Cylinder):
         shape.spacing(height)  # raises GeometryError for a camera that is too low
-    return plan, model
+    return plan, manifest.mesh
 
 
 def models_for(options: argparse.Namespace, plan: MeshPlan) -> list[str]:

@@ -6,6 +6,7 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 
@@ -35,8 +36,8 @@ def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="vm-ros",
         description="Run the detector as a node of ROS 2: find objects in the images of a topic, and publish them as "
-        "vision_msgs, and the state as diagnostics. It uses rclpy where ROS is sourced, and the package cyclonedds "
-        "elsewhere.",
+        "vision_msgs, and the state as diagnostics. Lines on standard output need --output-stdout. It uses rclpy where "
+        "ROS is sourced, and the package cyclonedds elsewhere.",
         epilog="Exit status: as that of vm-detect for a live camera. Where ROS is sourced, the options behind "
         f"{ROS_ARGUMENTS} are those of ROS, such as -r for remapping. " + ANGLES,
     )
@@ -85,9 +86,12 @@ async def _prepare(options: argparse.Namespace, ros_arguments: Sequence[str], lo
 
 
 def configuration(options: argparse.Namespace) -> Configuration:
-    """The configuration of vm-detect, with images of ROS, and poses of tf unless a pose is given. Raises InputError."""
+    """The configuration of vm-detect, with images of ROS, and poses of tf unless a pose is given. Raises InputError.
+
+    Only the option --output-stdout turns standard output on: a vm.toml of --print-config always names it.
+    """
     given = read_options(options)
-    ros: dict[str, dict[str, str]] = {}
+    ros: dict[str, dict[str, Any]] = {"output": {"stdout": bool(options.output_stdout)}}
     if not given.camera.source:
         ros["camera"] = {"source": ROS}
     if (given.camera.source or ROS) == ROS and given.pose.source == "fixed" and given.fixed_orientation() is None:

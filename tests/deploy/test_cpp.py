@@ -118,7 +118,7 @@ def expected_lines(message):
         yield "circle.center", circle["center"]
     for each in field["crossings"]:
         yield "crossing.kind", each["kind"]
-        yield "crossing", [*each["position"], each["heading"]]
+        yield "crossing", [*each["position"], each["heading"], each["confidence"]]
     if border := field.get("border"):
         for point, pixel in zip(border["points"], border["pixels"], strict=True):
             yield "border", point

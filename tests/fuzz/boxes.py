@@ -52,7 +52,7 @@ def run(data: bytes) -> None:
     for each in (None, *FORMATS):
         with suppress(VisualMeshError):
             found = read_boxes(folder, each)
-            assert all(len(fault.splitlines()) == 1 for fault in found.faults), found.faults
+            assert all(len(each.text.splitlines()) == 1 for each in found.findings), found.findings
             assert all(name.isprintable() for name in found.names), found.names
     with suppress(VisualMeshError):
         list(files_in(folder))

@@ -113,9 +113,22 @@ def test_pictures_without_a_board_are_an_error(tmp_path, capsys):
 def test_another_pattern_of_markers_is_an_error_with_advice(tmp_path, capsys):
     folder = write(tmp_path / "film", [film("rectilinear").pictures(1, charuco_texture())[0]])
     board = ("--board", "8x8", "--square", "0.08", "--charuco", "4X4_50", "--marker", "0.06", "--legacy")
-    assert "markers of 4X4_50 are visible; check --board" in run(
-        capsys, "lens", folder, *board, "-o", tmp_path / "lens.yaml", code=1
-    )
+    said = run(capsys, "lens", folder, *board, "-o", tmp_path / "lens.yaml", code=1)
+    assert "22 markers of 4X4_50 are visible; --board counts squares: try --board 9x6\n" in said
+
+
+@pytest.mark.parametrize("legacy", [False, True])
+@pytest.mark.parametrize("size", ["8x8", "5x7", "7x10", "6x4", "12x8"])
+def test_the_size_of_a_charuco_board_is_told_from_its_markers(size, legacy):
+    real = board_from(size, 0.03, "4X4_50", 0.022, legacy)
+    drawn = real._board.generateImage((100 * real.columns, 100 * real.rows), marginSize=40)
+    oblique = np.array([[0.8, 0.15, 30.0], [-0.05, 0.7, 60.0], [0.0002, 0.0003, 1.0]])
+    picture = cv2.warpPerspective(drawn, oblique, (1000, 1000), borderValue=255)
+    assert real.other_size(picture) is None
+    for wrong in ("9x6", "4x4", "6x9"):
+        told = board_from(wrong, 0.03, "4X4_50", 0.022, legacy).other_size(picture)
+        assert told == size, (wrong, told)
+        assert board_from(wrong, 0.03, "4X4_50", 0.022, legacy).marker_count(picture) == real.columns * real.rows // 2
 
 
 def test_too_few_frames_are_an_error(tmp_path, capsys):

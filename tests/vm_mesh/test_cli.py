@@ -12,7 +12,10 @@ import numpy as np
 import pytest
 
 from tests.programs import run_main
-from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.mesh.models import MESH_MODELS, build_mesh
+from vm_embedded.network.bundled import DEFAULT, model_path
+from vm_embedded.network.model_file import read_model
 from vm_mesh.cli import main
 
 DEMO = Path(__file__).parents[1] / "fixtures/demo"
@@ -42,6 +45,18 @@ def test_show_draws_every_model(model, tmp_path, capsys):
     assert (picture < 128).any(axis=2).sum() > 500  # points and links
     orange = (picture[:, :, 2].astype(int) - picture[:, :, 0] > 40).sum()
     assert orange > 100  # objects
+
+
+def test_show_draws_the_mesh_of_vm_detect(tmp_path, capsys):
+    """Without options, it is that of the network that vm-detect uses without --model."""
+    said = [
+        run(capsys, "show", *words, "-o", tmp_path / "mesh.png")
+        for words in ((), ("--network", "ball"), ("--radius", 0.05))
+    ]
+    assert said[0] == said[1] != said[2]
+    manifest = read_model(model_path(DEFAULT)).manifest
+    mesh = build_mesh(Sphere(manifest.radius), 1.0, manifest.intersections, manifest.max_distance, manifest.mesh)
+    assert said[0].endswith(f"{manifest.mesh}, {len(mesh)} points\n")
 
 
 def test_show_draws_walls_by_direction_and_not_on_the_ground(tmp_path, capsys):

@@ -81,7 +81,7 @@ class Peer:
 @contextmanager
 def running(tmp_path, *options):
     """A vm-ros that ends with the block, whatever happens in it."""
-    words = [COMMAND, "--status-socket", tmp_path / "control", "--max-distance", "6", *options]
+    words = [COMMAND, "--status-socket", tmp_path / "control", "--max-distance", "6", "--output-stdout", *options]
     process = subprocess.Popen(
         list(map(str, words)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=dict(os.environ)
     )

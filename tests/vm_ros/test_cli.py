@@ -112,6 +112,13 @@ def test_a_wrong_configuration_for_vm_ros_is_one_line(tmp_path):
     )
 
 
+@pytest.mark.parametrize(("words", "prints"), [([], False), (["--output-stdout"], True)])
+def test_lines_are_printed_only_if_asked_for(words, prints, tmp_path):
+    (tmp_path / "vm.toml").write_text("[output]\nstdout = true\n")
+    for config in ([], ["--config", str(tmp_path / "vm.toml")]):
+        assert configuration(parser().parse_args([*config, *words])).output.stdout is prints
+
+
 def test_the_package_of_ros_has_this_version_and_depends_on_all_messages():
     package = ElementTree.parse(PACKAGE / "package.xml").getroot()
     assert package.findtext("version") == re.sub(r"(a|b|rc)\d+$", "", __version__)

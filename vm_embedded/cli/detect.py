@@ -49,7 +49,8 @@ def parser() -> argparse.ArgumentParser:
     """The command line of vm-detect; its settings are the fields of Settings."""
     parser = Parser(
         prog="vm-detect",
-        description="Find objects in images, videos or live cameras, and print one line of JSON for each frame.",
+        description="Find objects in images, videos or live cameras, and print a line for each frame: for people at a "
+        "terminal, otherwise JSON.",
         epilog="Exit status for files: 0, at least one frame was processed; 1, no frame was processed. For a live "
         "camera: 0, a signal such as Ctrl-C stopped it, or the played file has ended; 1, a second signal ended it at "
         "once, or the played file has ended and no frame could be processed; 75, reads of the camera or a frame "
@@ -72,6 +73,13 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--live", action="store_true", help="play files like a live camera: at their frame rate, skipping late frames"
+    )
+    parser.add_argument(
+        "--json",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="print each frame as a line of JSON, or as a line for people; default: for people if standard output is "
+        "a terminal",
     )
     add_model(parser)
     add_pose(parser, "for frames imageNAME.* without a file lensNAME.yaml beside them")
@@ -120,9 +128,7 @@ def parser() -> argparse.ArgumentParser:
         help="write images, lenses, poses, detections and states as FILE.mcap, for Foxglove and ROS 2",
     )
     output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
-    output.add_argument(
-        "--explain", action="store_true", help="add rejected proposals or clusters to the JSON, with reasons"
-    )
+    output.add_argument("--explain", action="store_true", help="add rejected proposals or clusters, with reasons")
     add_settings(parser)
     add_track(parser)
     add_live(parser)
@@ -141,6 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.camera = options.files[0] if options.files else None
     silence_opencv()
     cv2.setNumThreads(1)  # a frame has a few thousand points: too little work for more
+    if options.json is None:
+        options.json = not sys.stdout.isatty() or bool(options.emit_points)
     return run_or_complain("vm-detect", lambda: _run(options))
 
 
@@ -215,6 +223,8 @@ def _ask(socket: str, command: str) -> int:
 
 def _check_file_options(options: argparse.Namespace) -> None:
     """Raise InputError for options that files reject."""
+    if options.emit_points and not options.json:
+        raise InputError("--emit-points adds the points to the JSON: leave --no-json out")
     sections = _LIVE_ONLY if any(map(is_bag, options.files)) else (*_LIVE_ONLY, "pose")
     for name in (f"{section}_{each.name}" for section in sections for each in fields(LIVE[section])):
         if getattr(options, name) is not None:
@@ -230,7 +240,7 @@ def _detect_live(options: argparse.Namespace) -> int:
         _check_live_options(options)
     except InputError as error:
         return report_failed_start(log, error)
-    return run_daemon(log, lambda: Daemon.prepare(lambda: read_options(options), log))
+    return run_daemon(log, lambda: Daemon.prepare(lambda: read_options(options), log, readable=not options.json))
 
 
 def _check_live_options(options: argparse.Namespace) -> None:

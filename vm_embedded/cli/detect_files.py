@@ -21,6 +21,7 @@ from ..files import check_not_input
 from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
+from ..output.readable_line import to_readable_line
 from ..output.result_files import FrameNames, make_folder, save_overlay, save_points
 from ..output.ros.mcap_file import McapFile
 from ..output.video_file import VideoFile
@@ -36,7 +37,7 @@ _IMAGES_RATE = 10.0
 
 
 def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
-    """Process each frame of the source, print a line of JSON for it, and return the number of processed frames.
+    """Process each frame of the source, print its line, and return the number of processed frames.
 
     A frame that can't be processed is reported on standard error and skipped. Raises VisualMeshError for errors that
     concern all frames.
@@ -48,7 +49,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     for name in emit_points:
         detector.manifest.column(name)
     check_read_format(format)
-    source = _open(options.files or [given.camera.source], given)
+    source = open_frames(options.files or [given.camera.source], given)
     _check_overlays(options, source)
     for folder in (options.save_overlay, options.save_points):
         if folder is not None:
@@ -112,7 +113,7 @@ def _process_all(source: Source, work: _Pass) -> None:
             complain("vm-detect", f"{count} frames could not be processed: {reason}")
 
 
-def _open(names: Sequence[str], given: Configuration) -> Source:
+def open_frames(names: Sequence[str], given: Configuration) -> Source:
     """The frames of images, folders, videos and bags. Raises InputError."""
     raw, largest = given.detector.format != "bgr", given.camera.max_megapixels
     if not any(map(is_bag, names)):
@@ -170,7 +171,7 @@ class _Pass:
     replaced: str = ""
 
     def process(self, frame: Frame) -> str:
-        """Detect in a frame, save the files that the options ask for, and return its line of JSON.
+        """Detect in a frame, save the files that the options ask for, and return its line: JSON, or for people.
 
         Raises InputError that names the frame.
         """
@@ -204,4 +205,5 @@ class _Pass:
             self.mcap.write(frame, lens, orientation, detections)
         if self.video is not None:
             self.video.write(detections.draw())
-        return json.dumps(file_message(frame, detections, self.emit_points, options.explain), allow_nan=False)
+        message = file_message(frame, detections, self.emit_points, options.explain)
+        return json.dumps(message, allow_nan=False) if options.json else to_readable_line(message)

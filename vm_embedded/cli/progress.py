@@ -62,7 +62,12 @@ class ProgressBar:
             control_terminal("\r\x1b[K")
             self._visible = False
 
+    @property
+    def left(self) -> str:
+        """The time left, from the speed so far: hours, minutes and seconds."""
+        steps = (self._total or self.done) - self.done
+        seconds = int(steps * self.elapsed / max(self.done - self._done_before, 1))
+        return f"{seconds // 3600}:{seconds // 60 % 60:02d}:{seconds % 60:02d} left"
+
     def _text(self, total: int) -> str:
-        seconds = int((total - self.done) * self.elapsed / max(self.done - self._done_before, 1))
-        left = f"{seconds // 3600}:{seconds // 60 % 60:02d}:{seconds % 60:02d} left"
-        return ", ".join(filter(None, [f"{self.done}/{total}", left, self.note]))
+        return ", ".join(filter(None, [f"{self.done}/{total}", self.left, self.note]))

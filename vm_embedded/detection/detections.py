@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any, overload
 
 import cv2
 import numpy as np
 
-from ..arrays import AnyImage, Floats, Image, Singles
-from ..errors import InputError, unknown
+from ..arrays import AnyImage, Floats, Image, Singles, one_number
+from ..errors import InputError, one_line, unknown
 from ..field.features import FieldFeatures
 from ..files import write_file
 from ..network.manifest import Manifest
 from .detection import Detection
 from .observation import Observation
 from .overlay import draw_overlay
+from .table import to_csv, to_row
 
 _PICTURES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
 _ENCODING = dict.fromkeys((".jpg", ".jpeg"), (cv2.IMWRITE_JPEG_QUALITY, 92))
@@ -69,10 +72,11 @@ class Detections:
     def __getitem__(self, index: int) -> Detection: ...
 
     @overload
-    def __getitem__(self, index: slice) -> tuple[Detection, ...]: ...
+    def __getitem__(self, index: slice) -> Detections: ...
 
-    def __getitem__(self, index: int | slice) -> Detection | tuple[Detection, ...]:
-        return self.objects[index]
+    def __getitem__(self, index: int | slice) -> Detection | Detections:
+        """One object, or with a slice the same Detections with some of their objects."""
+        return replace(self, objects=self.objects[index]) if isinstance(index, slice) else self.objects[index]
 
     def __repr__(self) -> str:
         return f"<{len(self.objects)} detections, {len(self.pixels)} points: {list(self.objects)}>"
@@ -91,6 +95,82 @@ class Detections:
         data["timing_ms"] = {stage: round(value, 3) for stage, value in self.timing_ms.items()}
         return data
 
+    def filter(
+        self,
+        class_name: str | Iterable[str] | None = None,
+        *,
+        min_confidence: float = 0.0,
+        min_distance: float = 0.0,
+        max_distance: float = math.inf,
+    ) -> Detections:
+        """The same Detections with some of their objects; the points and features of the field stay.
+
+        class_name: one class or several; None: all. min_confidence: 0 to 1. min_distance, max_distance [m]: from the
+        camera to the object's center. Each limit is included. Raises InputError for a class that gives no objects, and if
+        a limit is not a number.
+        """
+        names = self._object_classes()
+        chosen = names if class_name is None else _listed(class_name)
+        for each in chosen:
+            if each not in names:
+                raise InputError(unknown("class", each, names))
+        confidence = _checked_limit(min_confidence, "min_confidence")
+        nearest, farthest = _checked_limit(min_distance, "min_distance"), _checked_limit(max_distance, "max_distance")
+        kept = (
+            each
+            for each in self
+            if each.class_name in chosen and each.confidence >= confidence and nearest <= each.distance <= farthest
+        )
+        return replace(self, objects=tuple(kept))
+
+    @property
+    def xyxy(self) -> Floats:
+        """Boxes (k, 4) [px] around the outlines of the k objects, cut at the edges of the image: left, top, right,
+        bottom. A box that covers the first pixel begins at 0, and one that covers the last one ends at the width or
+        height. The box of an object whose outline the lens does not see is empty."""
+        size = self.observation.view.size
+        outlines = [each.outline if len(each.outline) > 2 else each.center[None] for each in self]
+        return np.array([edges_in_image(each, size) for each in outlines]).reshape(-1, 4)
+
+    def to_rows(self) -> list[dict[str, Any]]:
+        """The objects as rows of plain numbers, for pandas.DataFrame(detections.to_rows()).
+
+        class, confidence, distance; x, y, z: position [m]; xmin, ymin, xmax, ymax: as in `xyxy`; center_x, center_y,
+        radius, angular_radius, distance_by_angle, distances_agree, points; track: its number, or None.
+        """
+        return [to_row(each, box) for each, box in zip(self, self.xyxy, strict=True)]
+
+    def to_supervision(self) -> Any:
+        """The objects as supervision.Detections, for its annotators and trackers.
+
+        class_id: the number of the class among those that give objects. tracker_id: the number of the track, or -1;
+        None without tracks. data: class_name, distance (k,) [m] and position (k, 3) [m]. Raises InputError if the
+        package supervision is not installed.
+        """
+        try:
+            supervision = import_module("supervision")
+        except ImportError as error:
+            raise InputError(
+                f"to_supervision needs the package supervision; run: pip install supervision ({one_line(error)})"
+            ) from error
+        names = self._object_classes()
+        tracks = [-1 if each.track is None else each.track.id for each in self]
+        return supervision.Detections(
+            xyxy=self.xyxy,
+            confidence=np.array([each.confidence for each in self]),
+            class_id=np.array([names.index(each.class_name) for each in self], dtype=int),
+            tracker_id=np.array(tracks) if any(each > 0 for each in tracks) else None,
+            data={
+                "class_name": np.array([each.class_name for each in self], dtype=str),
+                "distance": np.array([each.distance for each in self]),
+                "position": np.array([each.position for each in self]).reshape(-1, 3),
+            },
+        )
+
+    def _object_classes(self) -> list[str]:
+        """The names of the classes that give objects."""
+        return [each.name for each in self.manifest.classes if each.kind == "object"]
+
     def to_json(self) -> str:
         """The same as one line of JSON."""
         return json.dumps(self.as_dict(), allow_nan=False)
@@ -105,7 +185,8 @@ class Detections:
         return draw_overlay(canvas, self.observation, self.objects, self.rejected, self.threshold, self.field)
 
     def save(self, path: str | Path) -> None:
-        """Write the frame with all that was found drawn in (.jpg, .png and others), or the results as JSON (.json).
+        """Write the frame with all that was found drawn in (.jpg, .png and others), the results as JSON (.json), or
+        the rows of the objects (.csv).
 
         Raises InputError for another suffix, or if the file can't be written.
         """
@@ -113,11 +194,13 @@ class Detections:
         suffix = path.suffix.lower()
         if suffix == ".json":
             content = self.to_json().encode() + b"\n"
+        elif suffix == ".csv":
+            content = to_csv(self.to_rows()).encode()
         elif suffix in _PICTURES:
             good, encoded = cv2.imencode(suffix, self.draw(), _ENCODING.get(suffix, ()))
             content = encoded.tobytes() if good else b""
         else:
-            raise InputError(f"can't write {path}: {unknown('suffix', suffix, (*_PICTURES, '.json'))}")
+            raise InputError(f"can't write {path}: {unknown('suffix', suffix, (*_PICTURES, '.json', '.csv'))}")
         if not content:
             raise InputError(f"can't write {path}: OpenCV can't encode it; a .webp has at most 16383 px on each side")
         write_file(path, content)
@@ -147,6 +230,26 @@ class Detections:
         column = self.probabilities[:, self.manifest.column(class_name)]
         chosen = np.flatnonzero(column > self.threshold)
         return ClassPoints(class_name, self.rays[chosen], self.pixels[chosen], column[chosen])
+
+
+def edges_in_image(outline: Floats, size: tuple[int, int]) -> Floats:
+    """The edges (4,) [px] of the box around the part of an outline (m, 2) [px] that is in an image, as in
+    Detections.xyxy. size: width and height of the image [px]. In outlines, pixel centers are whole numbers."""
+    edges = np.stack([outline.min(axis=0), outline.max(axis=0)]) + 0.5
+    return np.asarray(edges.clip(0.0, size).reshape(4))
+
+
+def _listed(given: object) -> list[Any]:
+    """One value as a list, and several as one."""
+    return list(given) if isinstance(given, Iterable) and not isinstance(given, str) else [given]
+
+
+def _checked_limit(value: object, name: str) -> float:
+    """A limit as a number. Raises InputError for anything else, also for NaN, which would leave out every object."""
+    limit = one_number(value, name)
+    if math.isnan(limit):
+        raise InputError(f"{name} must be a number, not NaN")
+    return limit
 
 
 def _checked_canvas(image: AnyImage, size: tuple[int, int]) -> Image:

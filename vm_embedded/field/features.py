@@ -92,16 +92,23 @@ class Crossing:
 
     kind: L, T or X. position (2,) [m]. heading [rad]: counterclockwise from the x axis; for T the direction of the line
     that ends there, away from the crossing; for L halfway between its two lines, into the corner; for X the direction
-    of either line, from 0 to a right angle.
+    of either line, from 0 to a right angle. confidence: product of those of its two lines, and down to half of it if
+    one ends in front of the crossing; 0 to 1.
     """
 
     kind: str
     position: Floats
     heading: float
+    confidence: float
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        return {"kind": self.kind, "position": _rounded(self.position, 3), "heading": round(self.heading, 3)}
+        return {
+            "kind": self.kind,
+            "position": _rounded(self.position, 3),
+            "heading": round(self.heading, 3),
+            "confidence": round(self.confidence, 3),
+        }
 
 
 @dataclass(frozen=True, eq=False)

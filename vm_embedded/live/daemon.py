@@ -84,7 +84,7 @@ class Daemon:
     """Runs until a signal stops it, the camera ends, or too many reads of the camera hang.
 
     configure: reads the configuration for each reload. opener: opens the camera. proved: in words, what shows that the
-    detector works. bridge: to other robot software.
+    detector works. bridge: to other robot software. readable: standard output gets lines for people.
     """
 
     def __init__(
@@ -96,6 +96,7 @@ class Daemon:
         proved: str,
         log: EventLog,
         bridge: Bridge | None = None,
+        readable: bool = False,
     ) -> None:
         self._configure = configure
         self._proved = proved
@@ -117,7 +118,7 @@ class Daemon:
         self._reloading: asyncio.Task[None] | None = None
         self._grabber = Grabber(opener, camera, self._wake)
         self._poses = PoseStream(configuration.pose, self._report_bad_pose)
-        self._outputs = Channels(configuration.output)
+        self._outputs = Channels(configuration.output, readable)
         self._counters = Counters(self._grabber, self._poses, self._outputs)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self._poses, self._counters, self._health, self._watchdog)
@@ -130,13 +131,17 @@ class Daemon:
 
     @classmethod
     async def prepare(
-        cls, configure: Callable[[], Configuration], log: EventLog, bridge: Bridge | None = None
+        cls,
+        configure: Callable[[], Configuration],
+        log: EventLog,
+        bridge: Bridge | None = None,
+        readable: bool = False,
     ) -> Daemon:
         """A daemon whose configuration was read and whose detector was proved. Raises VisualMeshError."""
         configuration = configure()
         opener = find_opener(configuration, bridge)  # its checks are quick, so they are the first
         detector, proved = await load_checked_detector(configuration)
-        return cls(configure, configuration, opener, detector, proved, log, bridge)
+        return cls(configure, configuration, opener, detector, proved, log, bridge, readable)
 
     @property
     def _configuration(self) -> Configuration:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from .messages import STATES, Message
 
-VERSION = 2
+VERSION = 3
 """Second field of the header. Any change of the layout changes it."""
 
 HEADER = struct.Struct("<I4B2d2I3f10H")
@@ -35,7 +35,7 @@ _FIELDS = {
     "robots": _UPRIGHT,
     "lines": "ends:(2,2)<f4 pixels:(2,2)<f4 confidence:<f4",
     "circle": "center:(2,)<f4 radius:<f4 arc:<f4 confidence:<f4",
-    "crossings": "kind:<u4 position:(2,)<f4 heading:<f4",
+    "crossings": "kind:<u4 position:(2,)<f4 heading:<f4 confidence:<f4",
     "border": "point:(2,)<f4 pixel:(2,)<f4",
 }
 

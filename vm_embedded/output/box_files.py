@@ -18,7 +18,7 @@ import numpy as np
 
 from ..arrays import Floats, Image
 from ..cameras.frame_source import Frame
-from ..detection.detections import Detections
+from ..detection.detections import Detections, edges_in_image
 from ..errors import InputError
 from ..files import read_bytes, write_file
 from ..geometry.lens import Lens
@@ -127,8 +127,7 @@ def bounding_box(outline: Floats, size: tuple[int, int]) -> Shares | None:
     """
     if len(outline) < 3 or not np.isfinite(outline).all():
         return None
-    low = np.clip(outline.min(axis=0) + 0.5, 0.0, size)
-    high = np.clip(outline.max(axis=0) + 0.5, 0.0, size)
+    low, high = edges_in_image(outline, size).reshape(2, 2)
     if (high - low).min() < _LEAST_SIDE:
         return None
     x, y, width, height = np.concatenate([(low + high) / 2 / size, (high - low) / size]).round(6).tolist()

@@ -25,6 +25,7 @@ from ..errors import InputError
 from .binary_form import to_binary
 from .file_channel import DescriptorChannel, FileChannel
 from .messages import Message, to_json_line, to_ros
+from .readable_line import to_readable_line
 
 _PAUSE = 0.1
 """Time between two reads of what a reader sends [s]: a flood of it would take the processor from the frames."""
@@ -78,11 +79,13 @@ class Channel(Protocol):
 
 
 class Channels:
-    """All channels of the settings."""
+    """All channels of the settings. readable: standard output gets lines for people, unless the format is ros."""
 
-    def __init__(self, settings: OutputSettings) -> None:
+    def __init__(self, settings: OutputSettings, readable: bool = False) -> None:
         self.settings = settings
+        self._readable = readable and settings.format != "ros"
         self._line_channels: list[Channel] = []
+        self._readable_channels: list[Channel] = []
         self._binary_channels: list[Channel] = []
 
     async def open(self) -> None:
@@ -94,7 +97,8 @@ class Channels:
                     descriptor = os.dup(sys.stdout.fileno())
                 except OSError as error:
                     raise InputError("standard output is closed; use --no-output-stdout") from error
-                self._line_channels.append(DescriptorChannel(descriptor, backlog))
+                chosen = self._readable_channels if self._readable else self._line_channels
+                chosen.append(DescriptorChannel(descriptor, backlog))
             if settings.file:
                 self._line_channels.append(FileChannel(settings.file, backlog))
             for each in filter(None, settings.udp.split(",")):
@@ -118,13 +122,17 @@ class Channels:
 
     @property
     def _all(self) -> list[Channel]:
-        return [*self._line_channels, *self._binary_channels]
+        return [*self._line_channels, *self._readable_channels, *self._binary_channels]
 
     def send(self, message: Message) -> None:
         """Send a message on all channels."""
         if self._line_channels:
             line = to_json_line(to_ros(message, self.settings.frame_id) if self.settings.format == "ros" else message)
             for each in self._line_channels:
+                each.send(line)
+        if self._readable_channels and message["type"] == "frame":  # the log says the states
+            line = to_readable_line(message).encode() + b"\n"
+            for each in self._readable_channels:
                 each.send(line)
         if self._binary_channels:
             encoded = to_binary(message)
@@ -136,6 +144,7 @@ class Channels:
         for each in self._all:
             await each.close()
         self._line_channels.clear()
+        self._readable_channels.clear()
         self._binary_channels.clear()
 
 

@@ -272,6 +272,7 @@ _PARTS: dict[str, Schema] = {
             "kind": {"enum": ["L", "T", "X"]},
             "position": _vector(2, "on the plane [m]"),
             "heading": _number("counterclockwise from the x axis [rad]"),
+            "confidence": _share("product of those of its lines, less if one ends in front of it"),
         },
     ),
     "border": _object(

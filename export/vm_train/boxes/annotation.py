@@ -8,6 +8,8 @@ from pathlib import Path
 from vm_embedded.geometry.lens import Size
 from vm_embedded.output.box_files import Edges
 
+from .findings import Finding
+
 
 @dataclass(frozen=True)
 class RawBox:
@@ -39,13 +41,13 @@ class Annotation:
 
 @dataclass(frozen=True)
 class Annotations:
-    """All annotations of a folder in one format, and the faults of its files, one line each.
+    """All annotations of a folder in one format, and the faults of its files.
 
     spoiled: images that a fault names already, and that are not used. complete: whether all annotation files could be
     read; otherwise, an image without annotation is no fault of its own.
     """
 
     found: tuple[Annotation, ...]
-    faults: tuple[str, ...]
+    faults: tuple[Finding, ...]
     spoiled: frozenset[Path] = frozenset()
     complete: bool = True

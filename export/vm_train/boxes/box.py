@@ -11,6 +11,8 @@ from vm_embedded.arrays import Floats
 from vm_embedded.geometry.lens import Size
 from vm_embedded.output.box_files import Edges
 
+from .findings import Finding, texts
+
 
 @dataclass(frozen=True)
 class Box:
@@ -63,12 +65,18 @@ class BoxedPicture:
 
 @dataclass(frozen=True)
 class BoxedSet:
-    """The usable pictures of a folder in the order of their paths, the faults of the others, and all names of boxes.
-
-    faults: one line each. It names the file, the place in it and the value, and says what is not used. names: of all
-    boxes, sorted.
-    """
+    """The usable pictures of a folder in the order of their paths, what the check found, and all names of boxes."""
 
     pictures: tuple[BoxedPicture, ...]
-    faults: tuple[str, ...]
+    findings: tuple[Finding, ...]
     names: tuple[str, ...]
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """A line about each image, file or box that is not used."""
+        return texts(self.findings, are_faults=True)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """A line about each doubt: the box is used, but look at it."""
+        return texts(self.findings, are_faults=False)

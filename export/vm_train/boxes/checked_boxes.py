@@ -13,6 +13,7 @@ from vm_workstation.box_grid import BoxGrid
 
 from .annotation import RawBox
 from .box import Box
+from .findings import LONG_BOX, SAME_BOX, Finding
 
 _SLIGHTLY = 2.0, 0.1
 """How far a box may reach outside of the image: [px], or as a share of its own size. It is clipped there."""
@@ -29,14 +30,14 @@ _EQUAL = 0.9
 
 @dataclass(frozen=True)
 class CheckedBoxes:
-    """The good boxes of an image, and a line about each fault.
+    """The good boxes of an image, and what the check found.
 
-    unusable: about boxes that are missing in `good`. Their objects must not become background, so the image can't be
-    used.
+    unusable: a line each about boxes that are missing in `good`. Their objects must not become background, so the image
+    can't be used.
     """
 
     good: list[Box]
-    faults: list[str]
+    findings: list[Finding]
     unusable: list[str]
 
 
@@ -54,13 +55,13 @@ def is_round(box: Box) -> bool:
 def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str]) -> CheckedBoxes:
     """Check the boxes of an image of this width and height [px].
 
-    boxes: with edges in pixels from 0 to width and height. round_names: classes of which a long box is a fault; the box
-    stays, so that nothing else takes its place for background.
+    boxes: with edges in pixels from 0 to width and height. round_names: classes of which a long box gets a remark; the
+    box stays, so that nothing else takes its place for background.
     """
     good: list[Box] = []
     places: list[str] = []
     grid = BoxGrid(_EQUAL)
-    faults, unusable = [], []
+    findings, unusable = [], []
     for raw in boxes:
         try:
             box = _inside(raw, size)
@@ -69,17 +70,19 @@ def checked_boxes(boxes: list[RawBox], size: Size, round_names: Collection[str])
             continue
         same = [at for at, other in grid.near(box.name, box.edges) if overlap(box.edges, other) >= _EQUAL]
         if same:
-            faults.append(f"{raw.place}: the same box of {box.name} as {_short(places[min(same)])}; box not used")
+            text = f"{raw.place}: the same box of {box.name} as {_short(places[min(same)])}; box not used"
+            findings.append(Finding(SAME_BOX, text))
             continue
         if box.name in round_names and not is_cut(box, size) and not is_round(box):
-            faults.append(
+            text = (
                 f"{raw.place}: {box.name} of {_by(box.width, box.height)} px, but width and height of a {box.name} "
                 f"in full view differ by a factor of {_ROUNDEST:g} at most; is it partly hidden? box kept"
             )
+            findings.append(Finding(LONG_BOX, text, is_fault=False))
         grid.add(box.name, box.edges)
         good.append(box)
         places.append(raw.place)
-    return CheckedBoxes(good, faults, unusable)
+    return CheckedBoxes(good, findings, unusable)
 
 
 def _inside(raw: RawBox, size: Size) -> Box:

@@ -18,6 +18,7 @@ from vm_embedded.output.box_files import Edges
 
 from .annotation import Annotation, Annotations, RawBox
 from .coco_file import CocoFile, Entry, Id, coco_files, is_id, number, parse_coco, shown
+from .findings import BAD_BOX, BAD_FILE, NO_IMAGE, Finding
 from .folder_files import FolderFiles
 from .image_index import ImageIndex, image_folders, once_each
 from .outer_box import outer_box, outer_box_of_turned
@@ -35,14 +36,14 @@ def read_coco(files: FolderFiles) -> Annotations:
     """All annotations in COCO format. An image is found below the folder by its path or its name."""
     index = ImageIndex(files)
     found: list[Annotation] = []
-    faults: list[str] = []
+    faults: list[Finding] = []
     spoiled: set[Path] = set()
     complete = True
     for path in coco_files(files):
         try:
             content = parse_coco(path)
         except InputError as error:
-            faults.append(f"{files.label(path)}: {error}; file not used")
+            faults.append(Finding(BAD_FILE, f"{files.label(path)}: {error}; file not used"))
             complete = False
             continue
         reader = _Reader(content, files.label(path), index, [*image_folders(path), files.folder])
@@ -54,11 +55,11 @@ def read_coco(files: FolderFiles) -> Annotations:
 
 
 class _Reader:
-    """Reads one file. faults: a line each. spoiled: images of bad entries."""
+    """Reads one file. spoiled: images of bad entries."""
 
     def __init__(self, content: CocoFile, label: str, index: ImageIndex, near: list[Path]) -> None:
         self._content, self._label, self._index, self._near = content, label, index, near
-        self.faults: list[str] = []
+        self.faults: list[Finding] = []
         self.spoiled: set[Path] = set()
 
     def annotations(self) -> list[Annotation]:
@@ -73,15 +74,17 @@ class _Reader:
             key = entry.get("image_id")
             key = known.get(key, known.get(str(key))) if is_id(key) else None
             if key is None:
-                self.faults.append(f"{place}: there is no image with id {shown(entry.get('image_id'))}; box not used")
+                text = f"{place}: there is no image with id {shown(entry.get('image_id'))}; box not used"
+                self.faults.append(Finding(NO_IMAGE, text))
                 continue
             try:
                 boxes[key].append(_box(entry, place, self._content.categories))
             except InputError as error:
-                self.faults.append(f"{place}: {error}")
+                text = f"{place}: {error}"
                 if key in images:
-                    self.faults[-1] += f"; {self._index.labels([images[key][0]])} not used"
+                    text += f"; {self._index.labels([images[key][0]])} not used"
                     self.spoiled.add(images[key][0])
+                self.faults.append(Finding(BAD_BOX, text))
         return [
             Annotation(path, self._label, tuple(boxes[key]), size)
             for key, (path, size) in images.items()
@@ -99,12 +102,12 @@ class _Reader:
             place = f"{self._label} image {shown(key)}"
             name = entry.get("file_name")
             if not isinstance(name, str):
-                self.faults.append(f"{place}: file_name {shown(name)} is not a text; not used")
+                self.faults.append(Finding(NO_IMAGE, f"{place}: file_name {shown(name)} is not a text; not used"))
                 continue
             try:
                 path = self._index.named(name, self._near)
             except InputError as error:
-                self.faults.append(f"{place}: {error}; not used")
+                self.faults.append(Finding(NO_IMAGE, f"{place}: {error}; not used"))
                 if name not in unclear:  # it may stand for thousands of images, in thousands of entries
                     unclear.add(name)
                     self.spoiled.update(self._index.of_name(name))
@@ -118,7 +121,7 @@ class _Reader:
                 keys[path] = key
                 found[key] = (path, _size(entry))
             except InputError as error:
-                self.faults.append(f"{place}: {error}; {image} not used")
+                self.faults.append(Finding(BAD_FILE, f"{place}: {error}; {image} not used"))
                 self.spoiled.add(path)
         return found
 

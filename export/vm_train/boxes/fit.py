@@ -9,11 +9,12 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Size
 
 from .annotation import Annotation, RawBox
+from .findings import TURNED, Finding
 from .image_facts import ImageFacts
 
 
-def fit(annotation: Annotation, facts: ImageFacts, label: str) -> tuple[list[RawBox], list[str]]:
-    """The boxes of an image in its upright pixels, with edges from 0 to width and height, and doubts, a line each.
+def fit(annotation: Annotation, facts: ImageFacts, label: str) -> tuple[list[RawBox], list[Finding]]:
+    """The boxes of an image in its upright pixels, with edges from 0 to width and height, and remarks.
 
     If the annotation states the size as stored, and the turn swaps width and height, its boxes are turned with the
     image. If both sizes are equal or it states none, they are taken as drawn on the upright image. label: of the image,
@@ -31,9 +32,11 @@ def fit(annotation: Annotation, facts: ImageFacts, label: str) -> tuple[list[Raw
     about = f"{label}: turned by its EXIF orientation {facts.orientation}"
     if as_stored:
         turned = [_turned(box, facts) for box in boxes]
-        return turned, [f"{about}, but {annotation.file} states the size as stored, {_px(facts.stored)}: boxes turned"]
+        text = f"{about}, but {annotation.file} states the size as stored, {_px(facts.stored)}: boxes turned"
+        return turned, [Finding(TURNED, text, is_fault=False)]
     where = "does not state" if stated is None else "leaves open"
-    return boxes, [f"{about}; {annotation.file} {where} whether its boxes are: taken as drawn on the turned image"]
+    text = f"{about}; {annotation.file} {where} whether its boxes are: taken as drawn on the turned image"
+    return boxes, [Finding(TURNED, text, is_fault=False)]
 
 
 def _px(size: Size) -> str:

@@ -12,6 +12,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.files import there
 
 from .annotation import Annotation, Annotations
+from .findings import SEVERAL, Finding
 from .folder_files import FolderFiles
 
 _IMAGE_FOLDERS = ("JPEGImages", "images")
@@ -94,7 +95,7 @@ def once_each(files: FolderFiles, found: Sequence[Annotation]) -> Annotations:
         by_image[each.image].append(each)
     several = {image: some for image, some in by_image.items() if len(some) > 1}
     faults = [
-        f"{files.label(image)}: annotated by {' and by '.join(each.file for each in some)}; not used"
+        Finding(SEVERAL, f"{files.label(image)}: annotated by {' and by '.join(each.file for each in some)}; not used")
         for image, some in several.items()
     ]
     single = tuple(each for each in found if each.image not in several)

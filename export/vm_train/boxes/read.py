@@ -16,6 +16,7 @@ from .box import BoxedPicture, BoxedSet
 from .checked_boxes import CheckedBoxes, checked_boxes
 from .coco import is_coco, read_coco
 from .coco_file import coco_files
+from .findings import BAD_BOX, BAD_IMAGE, BAD_LENS, NO_ANNOTATION, NO_NAME, SAME_IMAGE, Finding
 from .fit import fit
 from .folder_files import FolderFiles, find_files
 from .image_facts import ImageFacts, image_facts
@@ -36,20 +37,20 @@ def read_boxes(
     names: Mapping[str, str] | None = None,
     round_names: Collection[str] = ("ball",),
 ) -> BoxedSet:
-    """All images of a folder and its sub-folders that have good annotations, and one line for each fault.
+    """All images of a folder and its sub-folders that have good annotations, and all faults and remarks.
 
     Every place without a box counts as background. So an image is left out if one of its boxes can't be read.
 
     format: one of FORMATS; None finds it out. names: for names of classes in the annotations, the names to use; others
-    stay as they are. round_names: classes, after this renaming, of which a long box is a fault. Raises InputError if
+    stay as they are. round_names: classes, after this renaming, of which a long box gets a remark. Raises InputError if
     the folder has no images, no annotations, or those of several formats, and for an unknown format.
     """
     files = find_files(folder)
     annotations = FORMATS[_format(files, format)][1](files)
-    pictures, faults = _checked(files, annotations, names or {}, round_names)
-    faults += _unmapped(annotations, names or {})
+    pictures, findings = _checked(files, annotations, names or {}, round_names)
+    findings += _unmapped(annotations, names or {})
     found = sorted({box.name for picture in pictures for box in picture.boxes})
-    return BoxedSet(tuple(pictures), tuple(faults), tuple(found))
+    return BoxedSet(tuple(pictures), tuple(findings), tuple(found))
 
 
 def files_in(folder: Path) -> Iterator[Path]:
@@ -88,48 +89,52 @@ def _format(files: FolderFiles, format: str | None) -> str:
 
 def _checked(
     files: FolderFiles, annotations: Annotations, names: Mapping[str, str], round_names: Collection[str]
-) -> tuple[list[BoxedPicture], list[str]]:
-    """The good pictures in the order of their paths, and all faults."""
+) -> tuple[list[BoxedPicture], list[Finding]]:
+    """The good pictures in the order of their paths, and all faults and remarks."""
     by_image = {each.image: each for each in annotations.found}
     groups = recordings([path.relative_to(files.folder) for path in files.images])
     pictures: list[BoxedPicture] = []
-    faults = list(annotations.faults)
+    findings = list(annotations.faults)
     first: dict[bytes, Path] = {}
     for path, recording in zip(files.images, groups, strict=True):
         if path in annotations.spoiled or (path not in by_image and not annotations.complete):
             continue
+        label = files.label(path)
+        if path not in by_image:
+            text = f"{label}: no annotation names it; an image that shows nothing needs an empty one; not used"
+            findings.append(Finding(NO_ANNOTATION, text))
+            continue
         try:
-            if path not in by_image:
-                raise InputError("no annotation names it; an image that shows nothing needs an empty one")
             facts = image_facts(path)
             same = first.setdefault(facts.digest, path)
             if same != path:
-                raise InputError(f"the same image as {files.label(same)}")
-            boxes = _boxes(by_image[path], facts, files.label(path), names, round_names)
+                findings.append(Finding(SAME_IMAGE, f"{label}: the same image as {files.label(same)}; not used"))
+                continue
+            boxes = _boxes(by_image[path], facts, label, names, round_names)
         except InputError as error:
-            faults.append(f"{files.label(path)}: {error}; not used")
+            findings.append(Finding(BAD_IMAGE, f"{label}: {error}; not used"))
             continue
-        faults += boxes.faults
+        findings += boxes.findings
         if boxes.unusable:
-            faults += [f"{each}; {files.label(path)} not used" for each in boxes.unusable]
+            findings += [Finding(BAD_BOX, f"{each}; {label} not used") for each in boxes.unusable]
             continue
         lens, wrong = _lens(files, path, facts)
         pictures.append(BoxedPicture(path, facts.size, tuple(boxes.good), recording, lens))
-        faults += wrong
-    return pictures, faults
+        findings += wrong
+    return pictures, findings
 
 
 def _boxes(
     annotation: Annotation, facts: ImageFacts, label: str, names: Mapping[str, str], round_names: Collection[str]
 ) -> CheckedBoxes:
     """The boxes of an image in its upright pixels. Raises InputError for a wrong size."""
-    raw, faults = fit(annotation, facts, label)
+    raw, remarks = fit(annotation, facts, label)
     renamed = [replace(each, name=names.get(each.name, each.name)) for each in raw]
     checked = checked_boxes(renamed, facts.size, round_names)
-    return replace(checked, faults=faults + checked.faults)
+    return replace(checked, findings=remarks + checked.findings)
 
 
-def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | None, list[str]]:
+def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | None, list[Finding]]:
     """The good lens file beside an image, if there is one, and what is wrong with it."""
     path = lens_file_of(image)
     if path is None:
@@ -137,13 +142,16 @@ def _lens(files: FolderFiles, image: Path, facts: ImageFacts) -> tuple[Path | No
     try:
         read_lens_file(path).lens.for_image(facts.size)
     except InputError as error:
-        return None, [f"{files.label(path)}: {error}; {files.label(image)} is used without lens"]
+        text = f"{files.label(path)}: {error}; {files.label(image)} is used without lens"
+        return None, [Finding(BAD_LENS, text)]
     return path, []
 
 
-def _unmapped(annotations: Annotations, names: Mapping[str, str]) -> list[str]:
-    """A line for each name to map that no annotation has."""
+def _unmapped(annotations: Annotations, names: Mapping[str, str]) -> list[Finding]:
+    """A fault for each name to map that no annotation has."""
     there = sorted({box.name for each in annotations.found for box in each.boxes})
     return [
-        f"no box to rename to {names[name]}: {unknown('class', name, there)}" for name in names if name not in there
+        Finding(NO_NAME, f"no box to rename to {names[name]}: {unknown('class', name, there)}")
+        for name in names
+        if name not in there
     ]

@@ -11,6 +11,7 @@ from typing import Any
 from vm_workstation.text_tables import aligned
 
 from .box import Box, BoxedPicture, BoxedSet
+from .findings import NO_NAME, Finding
 
 _ALIKE = 0.75
 """Similarity of names, from 0 to 1, from which on one may be a misspelling of the other."""
@@ -20,7 +21,7 @@ def summary_lines(found: BoxedSet) -> Iterator[str]:
     """Lines about the usable pictures: their numbers, sizes and recordings, and a table of classes."""
     pictures = found.pictures
     recordings = Counter(each.recording for each in pictures)
-    yield f"{len(pictures)} pictures can be used, of {len(recordings)} recordings; {len(found.faults)} faults"
+    yield f"{len(pictures)} pictures can be used, of {len(recordings)} recordings; {_counts(found)}"
     if not pictures:
         return
     sizes = Counter(each.size for each in pictures).most_common()
@@ -53,28 +54,30 @@ def classes_of(found: BoxedSet) -> dict[str, dict[str, Any]]:
     return result
 
 
-def name_faults(found: BoxedSet, objects: Sequence[str]) -> list[str]:
-    """Lines about names of classes: near those of a network's objects but different, or none of these.
+def name_faults(found: BoxedSet, objects: Sequence[str]) -> list[Finding]:
+    """Faults about names of classes: near those of a network's objects but different, or none of these.
 
     objects: the classes of objects that the network finds.
     """
-    lines = []
+    findings = []
     for name in found.names:
         near = get_close_matches(name.lower(), objects, n=1, cutoff=_ALIKE)
         if near and name not in objects:
             where = [each for each in found.pictures if _of_class(each, name)]
             count = sum(len(_of_class(each, name)) for each in where)
-            lines.append(
+            text = (
                 f"class {name!r} ({count} box{'es' * (count > 1)}, the first in {where[0].image.name}): did you mean "
                 f"{near[0]!r}? Rename it with --names '{name}={near[0]}'"
             )
+            findings.append(Finding(NO_NAME, text))
     if found.pictures and not set(found.names) & set(objects):
         there = ", ".join(found.names) or "there are no boxes"
-        lines.append(
+        text = (
             f"no box of class {' or '.join(objects)}, which the network finds (classes: {there}): "
             f"rename one with --names NAME={objects[0]}"
         )
-    return lines
+        findings.append(Finding(NO_NAME, text))
+    return findings
 
 
 def rename_advice(counts: Counter[str], name: str) -> str:
@@ -82,6 +85,12 @@ def rename_advice(counts: Counter[str], name: str) -> str:
     found = ", ".join(f"{each} ({count})" for each, count in counts.most_common()) or "no boxes"
     near = list(counts) if len(counts) == 1 else get_close_matches(name.lower(), counts, n=1, cutoff=0.5)
     return f"it has {found}. Rename the class of these objects: --names {near[0] if near else 'NAME'}={name}"
+
+
+def _counts(found: BoxedSet) -> str:
+    faults, remarks = len(found.faults), len(found.remarks)
+    said = f"{faults} fault{'s' * (faults != 1)}"
+    return f"{said}, {remarks} remark{'s' * (remarks != 1)}" if remarks else said
 
 
 def _of_class(picture: BoxedPicture, name: str) -> list[Box]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from vm_embedded.output.box_files import overlap
 
 from .box import Box, BoxedPicture
+from .findings import NO_BOX, Finding
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,15 @@ def without_box(pictures: Sequence[BoxedPicture], sightings: Iterable[Sighting])
     return found
 
 
-def describe(sighting: Sighting, folder: Path) -> str:
-    """A line about an unlabeled object, with the image's path below the folder."""
+def describe(sighting: Sighting, folder: Path) -> Finding:
+    """A remark about an unlabeled object, with the image's path below the folder."""
     box = sighting.box
     x, y = box.center
-    return (
+    text = (
         f"{sighting.image.relative_to(folder)}: without a box, but looks like a {box.name}: x {x:.0f}, y {y:.0f}, "
         f"{box.width:.0f} x {box.height:.0f} px (probability {sighting.probability:.3f})"
     )
+    return Finding(NO_BOX, text, is_fault=False)
 
 
 def _meet(one: Box, other: Box) -> bool:

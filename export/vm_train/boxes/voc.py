@@ -15,6 +15,7 @@ from vm_embedded.output.box_files import Edges
 from vm_workstation.class_names import class_name
 
 from .annotation import Annotation, Annotations, RawBox
+from .findings import BAD_BOX, BAD_FILE, Finding
 from .folder_files import FolderFiles, read_bytes
 from .image_index import ImageIndex, image_folders, once_each
 from .outer_box import outer_box, outer_box_of_turned
@@ -48,7 +49,7 @@ def read_voc(files: FolderFiles) -> Annotations:
         except InputError as error:
             spoiled.update(images)
             names = f"; {index.labels(images)} not used" if images else ""
-            faults.append(f"{label}: {error}{names}")
+            faults.append(Finding(BAD_FILE, f"{label}: {error}{names}"))
             continue
         boxes, wrong = _boxes(root, label)
         size = None
@@ -58,7 +59,7 @@ def read_voc(files: FolderFiles) -> Annotations:
             wrong.append(f"{label}: {error}")
         if wrong:
             spoiled.add(image)
-            faults += [f"{each}; {files.label(image)} not used" for each in wrong]
+            faults += [Finding(BAD_BOX, f"{each}; {files.label(image)} not used") for each in wrong]
             continue
         found.append(Annotation(image, label, tuple(boxes), size))
     once = once_each(files, found)

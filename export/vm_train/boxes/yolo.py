@@ -11,6 +11,7 @@ from vm_workstation.yolo_labels import find_labels, parse_labels
 from vm_workstation.yolo_names import NameTables
 
 from .annotation import Annotation, Annotations, RawBox
+from .findings import BAD_BOX, BAD_FILE, NO_IMAGE, SEVERAL, Finding
 from .folder_files import FolderFiles
 
 
@@ -34,23 +35,24 @@ def read_yolo(files: FolderFiles) -> Annotations:
         label, names = files.label(path), tables.of(path.parent)
         if len(images) > 1:
             labels = " and ".join(files.label(each) for each in images)
-            faults.append(f"{labels}: two images with one name; {label} may belong to either; not used")
+            text = f"{labels}: two images with one name; {label} may belong to either; not used"
+            faults.append(Finding(SEVERAL, text))
             spoiled.update(images)
             continue
         try:
             boxes, wrong = parse_labels(read_text(path), names)
         except InputError as error:
-            faults.append(f"{error}; {files.label(images[0])} not used")
+            faults.append(Finding(BAD_FILE, f"{error}; {files.label(images[0])} not used"))
             spoiled.add(images[0])
             continue
         if wrong:
-            faults += [f"{label} {fault}; {files.label(images[0])} not used" for fault in wrong]
+            faults += [Finding(BAD_BOX, f"{label} {fault}; {files.label(images[0])} not used") for fault in wrong]
             spoiled.add(images[0])
             continue
         raw = tuple(RawBox(f"{label} line {each.line}", each.class_name, edges(each.shares)) for each in boxes)
         found.append(Annotation(images[0], label, raw, shares=True))
     strays = [path for path in files.with_suffix(".txt") if path.absolute() not in used and _has_boxes(path)]
-    faults += [f"{files.label(path)}: there is no image for it" for path in strays]
+    faults += [Finding(NO_IMAGE, f"{files.label(path)}: there is no image for it") for path in strays]
     return Annotations(tuple(found), tuple(faults), frozenset(spoiled))
 
 

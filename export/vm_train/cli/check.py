@@ -8,7 +8,7 @@ import os
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from itertools import groupby, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,9 @@ from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.files import check_writable, write_file
 from vm_workstation.option_types import at_least
-from vm_workstation.shortened import shortened
 from vm_workstation.text_tables import aligned, summary
 
+from ..boxes.findings import Finding, finding_lines
 from ..data.classes import Classes
 from ..data.inspection import Inspection, inspect_pictures
 from ..data.picture_files import paths_of
@@ -30,15 +30,12 @@ from .check_boxes import add_check_boxes
 
 EXIT_FAULTS = 1
 
-_NAMED = 20
-"""Faulty pictures to name, for each kind of fault."""
-
 _KINDS = {
-    "missing": "lack a file",
-    "damaged": "have a file that can't be read",
-    "size": "have a mask of another size than the image",
-    "lens": "have an invalid lens file",
-    "color": "have a mask with unknown colors or another pixel format",
+    "missing": "pictures lack a file",
+    "damaged": "pictures have a file that can't be read",
+    "size": "pictures have a mask of another size than the image",
+    "lens": "pictures have an invalid lens file",
+    "color": "pictures have a mask with unknown colors or another pixel format",
 }
 
 _EDGES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
@@ -59,6 +56,7 @@ def check_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--workers", type=at_least(1), metavar="N", help="reading processes; default: all cores")
     made.add_argument("--json", type=Path, metavar="FILE", help="write all results and all faults to this file")
+    made.add_argument("--verbose", action="store_true", help="print all faults and remarks, not one line for each kind")
     made.add_argument("--strict", action="store_true", help="also exit with 1 if a class appears in no picture")
     add_check_boxes(made)
     return made
@@ -81,7 +79,7 @@ def run_check(options: argparse.Namespace, classes: Classes, objects: Sequence[s
     print("\n".join(tables(found)))
     if options.json is not None:
         write_file(options.json, to_json(as_json(found), indent=1) + "\n")
-    for line in complaints(found):
+    for line in complaints(found, options.verbose):
         print(f"vm-train: {line}", file=sys.stderr)
     return EXIT_FAULTS if found.faults or (options.strict and found.absent) else EXIT_OK
 
@@ -152,14 +150,8 @@ def as_json(found: Inspection) -> dict[str, Any]:
     }
 
 
-def complaints(found: Inspection) -> list[str]:
-    """Lines about faulty pictures and absent classes; none if there are neither."""
-    lines = []
-    order = list(_KINDS)
-    for kind, some in groupby(sorted(found.faults, key=lambda each: order.index(each.kind)), lambda each: each.kind):
-        faults = list(some)
-        lines.append(f"{len(faults)} of {found.count} pictures {_KINDS[kind]}")
-        named = shortened([each.text for each in faults], _NAMED, "; vm-train check --json lists all")
-        lines += [f"  {each}" for each in named]
-    lines += [f"no picture shows class {name}: check its color in the configuration" for name in found.absent]
-    return lines
+def complaints(found: Inspection, verbose: bool) -> list[str]:
+    """Lines about faulty pictures, one for each kind if not `verbose`, and absent classes; or none."""
+    faults = [Finding(_KINDS[each.kind], each.text) for each in found.faults]
+    lines = [f"no picture shows class {name}: check its color in the configuration" for name in found.absent]
+    return [*finding_lines(faults, verbose, "vm-train check --verbose lists all"), *lines]

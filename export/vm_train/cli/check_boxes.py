@@ -1,4 +1,4 @@
-"""vm-train check --boxes: facts about the boxes of a folder, their faults, and a contact sheet."""
+"""vm-train check --boxes: facts about the boxes of a folder, faults and remarks, and a contact sheet."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,9 @@ from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_workstation.contact_sheet import check_sheet_path, write_sheet
 from vm_workstation.option_types import at_least
-from vm_workstation.shortened import shortened
 
 from ..boxes.box import BoxedSet
+from ..boxes.findings import finding_lines
 from ..boxes.read import files_in, read_boxes
 from ..boxes.sheet import box_sheet, unusual_first
 from ..boxes.summary import classes_of, name_faults, summary_lines
@@ -31,9 +32,6 @@ from ..boxes.unlabeled import Sighting, describe, without_box
 from .box_options import add_box_options, parse_names
 
 EXIT_FAULTS = 1
-
-_NAMED = 40
-"""Faults to print."""
 
 _ON_SHEET = 400
 """Boxes on a contact sheet, if no other number is given."""
@@ -94,17 +92,18 @@ def run_check_boxes(options: argparse.Namespace) -> int:
     objects, round_names = _objects(network)
     found = read_boxes(options.data, options.format, parse_names(options.names), round_names)
     unlabeled = [] if options.no_look else _unlabeled(found, network, bool(round_names))
-    faults = [*found.faults, *name_faults(found, objects), *(describe(each, options.data) for each in unlabeled)]
+    more = (*name_faults(found, objects), *(describe(each, options.data) for each in unlabeled))
+    found = replace(found, findings=found.findings + more)
     print("\n".join(summary_lines(found)))
     if options.json is not None:
-        write_file(options.json, to_json(_as_json(found, faults), indent=1) + "\n")
-    for line in shortened(faults, _NAMED, "; vm-train check --boxes --json FILE lists all"):
+        write_file(options.json, to_json(_as_json(found), indent=1) + "\n")
+    for line in finding_lines(found.findings, options.verbose, "--verbose lists all"):
         print(f"vm-train: {line}", file=sys.stderr)
     if unlabeled:
         print(_advice(len(unlabeled), options.sheet), file=sys.stderr)
     if options.sheet is not None:
         _write_sheet(options, found, objects, unlabeled)
-    return EXIT_FAULTS if faults else EXIT_OK
+    return EXIT_FAULTS if found.faults else EXIT_OK
 
 
 def _unlabeled(found: BoxedSet, network: Path, is_round: bool) -> list[Sighting]:
@@ -155,11 +154,12 @@ def _write_sheet(
     print(f"{options.sheet}: {len(chosen)} of {len(places)} boxes of {', '.join(objects)}{also}")
 
 
-def _as_json(found: BoxedSet, faults: Sequence[str]) -> dict[str, Any]:
+def _as_json(found: BoxedSet) -> dict[str, Any]:
     """All results, for other programs."""
     return {
         "pictures": len(found.pictures),
-        "faults": list(faults),
+        "faults": list(found.faults),
+        "remarks": list(found.remarks),
         "classes": classes_of(found),
         "recordings": dict(sorted(Counter(each.recording for each in found.pictures).items())),
         "sizes": {f"{w}x{h}": count for (w, h), count in Counter(each.size for each in found.pictures).most_common()},

@@ -13,8 +13,8 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
-from vm_workstation.shortened import shortened
 
+from ..boxes.findings import finding_lines
 from ..learning.folder_access import locked
 from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
 from .box_options import parse_names
@@ -22,9 +22,6 @@ from .training import stop_requests
 
 if TYPE_CHECKING:
     from ..tuning.run_folder import TuningRun
-
-_NAMED = 20
-"""Faults to name."""
 
 _FEW = 25
 """Frames for training; with fewer, the share of found boxes varied by half between seeds (docs/own-frames.md)."""
@@ -67,7 +64,7 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
     configuration = read_sections(TuningConfiguration, options.config, parse_overrides(options.set, example))
     source = BoxSource(options.boxes.resolve(), options.format, parse_names(options.names))
     found = source.read()
-    for line in shortened(found.faults, _NAMED, f"; vm-train check {options.boxes} --boxes lists them all"):
+    for line in finding_lines(found.findings, False, f"vm-train check {options.boxes} --boxes --verbose lists all"):
         print(f"vm-train: {line}", file=sys.stderr)
     if options.strict and found.faults:
         raise InputError("some boxes can't be used, see above: repair them, or leave out --strict to skip them")

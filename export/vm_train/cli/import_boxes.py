@@ -18,6 +18,7 @@ from vm_workstation.option_types import add_set
 from vm_workstation.shortened import shortened
 
 from ..boxes.box import BoxedPicture, BoxedSet
+from ..boxes.findings import finding_lines
 from ..boxes.read import read_boxes
 from ..boxes.summary import rename_advice
 from ..formats.box_import import import_boxes
@@ -27,7 +28,7 @@ from .box_options import add_box_options, parse_names
 from .training import load_start, read_configuration
 
 _NAMED = 40
-"""Faults, and boxes without labels, to print."""
+"""Boxes without labels to print."""
 
 
 def import_boxes_parser() -> argparse.ArgumentParser:
@@ -68,11 +69,11 @@ def run_import_boxes(options: argparse.Namespace) -> int:
     rule = _rule(configuration, options.object_radius)
     round_names = tuple(rule.colors) if isinstance(rule.shape, Sphere) else ()
     found = read_boxes(options.boxes, options.format, parse_names(options.names), round_names)
-    _complain(found.faults, f"vm-train check {options.boxes} --boxes lists them all")
+    _complain(finding_lines(found.findings, False, f"vm-train check {options.boxes} --boxes --verbose lists all"))
     _check(found, rule, options.boxes)
     write_radius = configuration.mesh.radius_of == "scene"
     result = import_boxes(found.pictures, options.boxes, options.out, rule, write_radius)
-    _complain(result.misfits, "no label comes from any of them")
+    _complain(shortened(result.misfits, _NAMED, "; no label comes from any of them"))
     if len(result.misfits) > result.labeled:
         print(
             "vm-train: most boxes do not fit: check --object-radius (a radius, not a diameter; it is "
@@ -130,8 +131,8 @@ def _has_object(picture: BoxedPicture, rule: MaskRule) -> bool:
     return any(box.name in rule.colors for box in picture.boxes)
 
 
-def _complain(lines: Sequence[str], more: str) -> None:
-    for line in shortened(lines, _NAMED, f"; {more}"):
+def _complain(lines: Sequence[str]) -> None:
+    for line in lines:
         print(f"vm-train: {line}", file=sys.stderr)
 
 

@@ -115,7 +115,7 @@ def find_good_pictures(
         found = inspect_pictures(pictures, configuration.classes.mask_classes(), hardware.workers + 1, bar.advance)
     finally:
         bar.clear()
-    for line in complaints(found):
+    for line in complaints(found, verbose=False):
         print(f"vm-train: {line}", file=sys.stderr)
     if strict and found.faults:
         raise InputError("some pictures are damaged, see above: repair them, or leave out --strict to skip them")
@@ -190,6 +190,13 @@ def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> in
         hardware = replace(hardware, workers=source.workers)
         if hardware.is_leader:
             print(f"vm-train: {hardware.workers} workers read the stream, as run.json says", file=sys.stderr)
+    if hardware.is_leader:
+        objects = [name for name, kind in run.configuration.classes.kinds.items() if kind == "object"]
+        print(
+            f"validation AP: average precision of the mesh points of {' and '.join(objects) or 'all classes'} in the "
+            "validation pictures, from 0 to 1; the network with the highest is kept",
+            flush=True,
+        )
     with stop_requests() as stop_requested:
         outcome = train(run, hardware, stop_requested)
     if not outcome.finished:
@@ -208,8 +215,7 @@ def _report(run: TrainingRun, outcome: TrainingOutcome) -> None:
         remove_caches(data.unpacked)
     if outcome.pictures:
         speed = outcome.pictures / max(outcome.seconds, 1e-9)
-        score = outcome.progress.best_ever
-        print(f"{model}: average precision {score:.3f} on the validation, {speed:.0f} pictures/s")
+        print(f"{model}: validation AP {outcome.progress.best_ever:.3f}, {speed:.0f} pictures/s")
     else:
         print(f"{model}: the training was finished already")
     if data.split.test:

@@ -67,7 +67,7 @@ class Recipe:
     # "This resampling was run twice" (paper: section "Training"): three rounds.
     rounds: int = number(3, "for selection hard: networks to train one after the other", "", (2, 10))
     patience: int = number(
-        0, "a round ends after this many epochs without a better validation score; 0: it never ends early", "", (0, 1e6)
+        0, "a round ends after this many epochs without a better validation AP; 0: it never ends early", "", (0, 1e6)
     )
     precision: str = one_of(PRECISIONS, "full", "arithmetic; mixed: bfloat16 where that is safe; faster on a GPU")
     seed: int = number(0, "seed of weights, order, point selection and augmentation", "", (0, 2**31))

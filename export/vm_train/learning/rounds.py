@@ -1,8 +1,10 @@
 """The rounds of a training.
 
 Each round trains a new network, from random weights or from those of a trained network (start.py). After each epoch the
-validation pictures score it, and the round keeps its best epoch in a checkpoint. A stopped training continues from its
-state, which is saved twice a minute.
+network is validated, and the round keeps its best epoch in a checkpoint. A stopped training continues from its state,
+which is saved twice a minute.
+
+Validation AP is the average precision of the mesh points of the classes that are objects, or of all classes if none is.
 """
 
 from __future__ import annotations
@@ -40,8 +42,8 @@ _SAVE_INTERVAL = 30.0  # [s] between states
 class TrainingProgress:
     """How far a training is, besides its weights; state.pt keeps these entries.
 
-    round: counted from 1. finished: whether the round is. validated: number of its validated epochs. best: score of
-    its best network. best_epoch: epoch of that network, counted from 1. best_ever: best score of all rounds.
+    round: counted from 1. finished: whether the round is. validated: number of its validated epochs. best: validation
+    AP of its best network. best_epoch: epoch of that network, counted from 1. best_ever: the best of all rounds.
     """
 
     round: int = 1
@@ -56,7 +58,8 @@ class TrainingProgress:
 class TrainingOutcome:
     """Result of a call of `train`.
 
-    finished: False if it was stopped. pictures, seconds: number of pictures used, and time taken, in this call.
+    finished: False if it was stopped. pictures, seconds: number of pictures used in all processes, and time
+    taken, in this call.
     """
 
     finished: bool
@@ -103,8 +106,8 @@ def _train_round(
         ):
             for whole, graphs in zip(batches, loader, strict=True):
                 batch = whole.part(hardware.rank, hardware.size)
-                pictures += len(batch.items)
-                current.process(batch, graphs)
+                pictures += len(whole.items)
+                current.process(batch, graphs, pictures)
                 if current.is_out_of_patience(batch):
                     break
                 current.save_if_due(batch)
@@ -133,20 +136,22 @@ class _Round:
         self._bar = ProgressBar(trainer.total, "vm-train", trainer.done)
         self._saved = perf_counter()
         self._losses: list[float] = []  # of the steps of this epoch
-        self._score = ""  # of the last validation, for the bar
+        self._rate = math.nan  # of the last step
+        self._shown = ""  # the last validation, for the bar
 
-    def process(self, batch: Batch, graphs: Sequence[LabeledGraph]) -> None:
-        """Learn from this process's part of a batch, or score it for the validation."""
+    def process(self, batch: Batch, graphs: Sequence[LabeledGraph], pictures: int) -> None:
+        """Learn from this process's part of a batch, or validate with it. pictures: number of those used so far."""
         if batch.validates:
             for each in graphs:
                 self._scores.add(self._trainer.probabilities(each), each.labels, each.distances)
             if batch.last:
-                self._end_validation()
+                self._end_validation(pictures)
         else:
             step = self._trainer.step(batch.items, graphs)
             self._log.write(step.number, {"loss": step.loss, "points": step.points, "rate": step.rate})
             self._losses.append(step.loss)
-            self._bar.note = f"epoch {batch.epoch + 1}, loss {np.mean(self._losses):.3f}{self._score}"
+            self._rate = step.rate
+            self._bar.note = f"epoch {batch.epoch + 1}, loss {np.mean(self._losses):.3f}{self._shown}"
             self._bar.advance()
 
     def is_out_of_patience(self, batch: Batch) -> bool:
@@ -179,58 +184,64 @@ class _Round:
         self.save()
         self._hardware.broadcast(None)  # wait until the leader has written the network that the next round reads
 
-    def _end_validation(self) -> None:
-        """Score the network over all processes, and keep it if it is the best so far."""
+    def _end_validation(self, pictures: int) -> None:
+        """Validate the network over all processes, and keep it if it is the best so far."""
         first, *others = self._hardware.gather(self._scores)
         scores = sum(others, start=first)
         self._scores = PointScores(self._classes)
         precisions = {name: scores.ranking(name).precision_recall.average_precision for name in scores.classes}
         known = {name: value for name, value in precisions.items() if not math.isnan(value)}
         objects = [name for name, kind in self._run.configuration.classes.kinds.items() if kind == "object"]
-        score = _mean_precision(known, objects)
+        precision = _mean_precision(known, objects)
         self._progress.validated += 1
         self._warn_if_unseen(known, objects)
-        record = {"epoch": self._progress.validated, "score": score, "average_precision": known}
+        record = {
+            "epoch": self._progress.validated,
+            "validation_average_precision": precision,
+            "average_precision": known,
+        }
         self._log.write(self._trainer.done, record)
-        is_best = score > self._progress.best
-        self._report(score, is_best)
+        is_best = precision > self._progress.best
+        self._report(precision, is_best, pictures)
         if is_best:
-            self._keep(score)
+            self._keep(precision)
 
-    def _report(self, score: float, is_best: bool) -> None:
-        """Print the loss and the score of an epoch: a long training shows at once whether it learns."""
+    def _report(self, precision: float, is_best: bool, pictures: int) -> None:
+        """Print the result of an epoch, speed and time left: a long training shows at once whether it learns."""
         self._bar.clear()
-        self._score = f", score {score:.3f}"
-        loss = f"loss {np.mean(self._losses):.3f}, " if self._losses else ""  # none after a stop before a validation
+        self._shown = f", validation AP {precision:.3f}"
+        recipe, best = self._run.configuration.training, " (the best so far)" if is_best else ""
+        words = [f"validation AP {precision:.3f}{best}"]
+        if self._losses:  # there are none after a stop before a validation
+            words = [f"loss {np.mean(self._losses):.3f}", *words, f"learning rate {self._rate:.2g}"]
+        words += [f"{pictures / max(self._bar.elapsed, 1e-9):.0f} pictures/s", self._bar.left]
         self._losses.clear()
         if self._hardware.is_leader:
-            recipe, best = self._run.configuration.training, ", the best so far" if is_best else ""
-            prefix = f"round {self._progress.round}, " if recipe.trainings > 1 else ""
-            epoch = f"epoch {self._progress.validated} of {recipe.epochs}"
-            print(f"{prefix}{epoch}: {loss}score {score:.3f}{best}", flush=True)
+            prefix = f"round {self._progress.round} of {recipe.trainings}, " if recipe.trainings > 1 else ""
+            print(f"{prefix}epoch {self._progress.validated} of {recipe.epochs}: {', '.join(words)}", flush=True)
 
     def _warn_if_unseen(self, known: dict[str, float], objects: Sequence[str]) -> None:
         """After the first validation, warn if its pictures show none of the classes that are objects."""
         unseen = bool(objects) and not known.keys() & set(objects)
         if unseen and self._progress.validated == 1 and self._hardware.is_leader:
             print(
-                f"vm-train: the validation pictures show no {' or '.join(objects)}: the score is the mean average "
-                "precision of all classes",
+                f"vm-train: the validation pictures show no {' or '.join(objects)}: the validation AP is the mean "
+                "of all classes",
                 file=sys.stderr,
             )
 
-    def _keep(self, score: float) -> None:
+    def _keep(self, precision: float) -> None:
         """Write the round's best network, and the best of all rounds if it is that, too."""
         progress, run = self._progress, self._run
-        progress.best, progress.best_epoch = score, progress.validated
-        is_best_ever = score > progress.best_ever
-        progress.best_ever = max(progress.best_ever, score)
+        progress.best, progress.best_epoch = precision, progress.validated
+        is_best_ever = precision > progress.best_ever
+        progress.best_ever = max(progress.best_ever, precision)
         if not self._hardware.is_leader:
             return
         provenance = run.provenance() | {
             "round": str(progress.round),
             "epoch": str(progress.validated),
-            "validation_average_precision": f"{score:.4f}",
+            "validation_average_precision": f"{precision:.4f}",
             "torch": torch.__version__,
         }
         manifest = replace(run.configuration.manifest, provenance=provenance)

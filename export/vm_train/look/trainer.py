@@ -87,6 +87,11 @@ class LookTrainer:
             network, Recipe(optimizer=recipe.optimizer, rate=recipe.rate, decay=recipe.decay), total
         )
 
+    @property
+    def rate(self) -> float:
+        """The learning rate of the next step."""
+        return self._optimizer.rate
+
     def grade(self) -> None:
         """Draw patches without an object by the network's errors from now on."""
         self.network.eval()
@@ -164,26 +169,29 @@ def train_epoch(
     bar: ProgressBar,
     save: Callable[[], None],
     stop_requested: Callable[[], bool],
-) -> bool:
-    """Train the rest of an epoch, counted from 1, of so many steps. Returns False after a stop.
+) -> str | None:
+    """Train the rest of an epoch, counted from 1, of so many steps.
 
-    save: writes the state, now and then and at a stop. Raises InputError if the loss is NaN or infinite.
+    Returns mean loss, learning rate and time left, in words; None after a stop. save: writes the state, now and then
+    and at a stop. Raises InputError if the loss is NaN or infinite.
     """
-    saved = perf_counter()
+    saved, all_losses = perf_counter(), []
     while trainer.done < epoch * steps:
         step = trainer.step()
         losses = {"loss": step.presence + step.place, "presence": step.presence, "place": step.place}
         log.write(step.number, losses | {"rate": step.rate})
+        all_losses.append(losses["loss"])
         bar.note = f"epoch {epoch}, loss {losses['loss']:.3f}"
         bar.advance()
         if stop_requested():
             bar.clear()
             save()
-            return False
+            return None
         if perf_counter() - saved > _SAVE_INTERVAL:
             save()
             saved = perf_counter()
-    return True
+    loss = f"loss {np.mean(all_losses):.3f}, " if all_losses else ""  # none after a stop before a validation
+    return f"{loss}learning rate {trainer.rate:.2g}, {bar.left}"
 
 
 def _drawn(

@@ -112,13 +112,15 @@ class _Training:
 
     def _train_epoch(self, epoch: int, log: TrainingLog, stop_requested: Callable[[], bool]) -> bool:
         """Train the rest of an epoch, counted from 0, and validate. Returns False after a stop."""
-        if not train_epoch(self._trainer, epoch + 1, self._epoch_steps, log, self._bar, self._save, stop_requested):
+        learned = train_epoch(self._trainer, epoch + 1, self._epoch_steps, log, self._bar, self._save, stop_requested)
+        if learned is None:
             return False
         score = LookScore.of(self._validate(), self._collected.validation)
         self._progress.validated += 1
         log.write(self._trainer.done, {"epoch": self._progress.validated} | asdict(score))
         self._bar.clear()
-        print(f"epoch {self._progress.validated} of {self._recipe.epochs}: {_description(score)}", flush=True)
+        epoch = f"epoch {self._progress.validated} of {self._recipe.epochs}"
+        print(f"{epoch}: {_description(score)}; {learned}", flush=True)
         self._save()
         return True
 
@@ -142,7 +144,8 @@ class _Training:
         print(f"validation: {len(validation)} proposals, {validation.objects} of them show the object {name}")
         proposer = "the glance passes on" if self._run.glance_sha256 else "the mesh network proposes"
         share = 100.0 * found.proposed / found.objects if found.objects else math.nan
-        print(f"{proposer} {found.proposed} of {found.objects} visible objects ({share:.0f} %)", flush=True)
+        print(f"{proposer} {found.proposed} of {found.objects} visible objects ({share:.0f} %)")
+        print("validation AP: average precision of the validation proposals, from 0 to 1", flush=True)
 
     def _finish(self, stop_requested: Callable[[], bool]) -> bool:
         """Calibrate the network on what it finds in the validation pictures, and write look.pt. False after a stop."""
@@ -218,7 +221,7 @@ class _Training:
 
 def _description(score: LookScore) -> str:
     return (
-        f"average precision {score.average_precision:.3f}, center error {score.center_error:.2f} radii, "
+        f"validation AP {score.average_precision:.3f}, center error {score.center_error:.2f} radii, "
         f"size error {100.0 * score.size_error:.0f} %"
     )
 

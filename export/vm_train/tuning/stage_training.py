@@ -138,16 +138,17 @@ class _Stage:
         epoch = self._progress.validated
         if self._trainer.done == epoch * self._recipe.steps and epoch in (0, self._recipe.epochs // 2):
             self._trainer.grade()
-        if not train_epoch(self._trainer, epoch + 1, self._recipe.steps, log, self._bar, self._save, stop_requested):
+        learned = train_epoch(self._trainer, epoch + 1, self._recipe.steps, log, self._bar, self._save, stop_requested)
+        if learned is None:
             return False
-        self._validate(log)
+        self._validate(log, learned)
         self._save()
         return True
 
-    def _validate(self, log: TrainingLog) -> None:
+    def _validate(self, log: TrainingLog, learned: str) -> None:
         """Keep the network, mixed with the one before, if it is better on the user's frames than those so far.
 
-        Without frames for validation, the last one stays.
+        Without frames for validation, the last one stays. learned: about the training of the epoch, to print.
         """
         mixture = self._mixer.mix(self._trainer.network)
         own = mixture.loss_of(self._patches.own_validation)
@@ -160,8 +161,8 @@ class _Stage:
         self._bar.clear()
         yours = "" if math.isnan(own) else f"{own:.3f} for your frames, "
         print(
-            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: loss {yours}"
-            f"{mixture.loss:.3f} for rendered patches, with {mixture.share:.0%} of the new weights",
+            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: validation loss {yours}"
+            f"{mixture.loss:.3f} for rendered patches, with {mixture.share:.0%} of the new weights; {learned}",
             flush=True,
         )
 

@@ -61,7 +61,7 @@ void print(const vm_detect::Frame& frame) {
     }
     for (const auto& each : frame.field->crossings) {
         std::printf("crossing.kind %c\n", each.kind);
-        numbers("crossing", {each.position[0], each.position[1], each.heading});
+        numbers("crossing", {each.position[0], each.position[1], each.heading, each.confidence});
     }
     for (const auto& each : frame.field->border) {
         numbers("border", each.point);

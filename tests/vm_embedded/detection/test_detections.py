@@ -1,15 +1,29 @@
 """Results as a user of the Python interface meets them: printed, as JSON, drawn and saved."""
 
+import csv
 import json
+import math
 import subprocess
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
 from tests.drawn_scenes import IMAGES, MODEL
-from vm_embedded import Detector, InputError, Orientation, Rectilinear, Settings, read_lens_file
+from vm_embedded import (
+    Detections,
+    Detector,
+    InputError,
+    Orientation,
+    Rectilinear,
+    Settings,
+    Track,
+    read_lens_file,
+)
+from vm_embedded.detection.table import COLUMNS
+from vm_embedded.network.manifest import ObjectClass
 
 LENS = IMAGES[0].with_name(IMAGES[0].name.replace("image", "lens")).with_suffix(".yaml")
 
@@ -116,3 +130,135 @@ def test_a_missing_image_is_an_error_of_the_user(tmp_path):
 def test_a_lens_file_without_orientation_is_an_error_of_the_user(image):
     with pytest.raises(InputError, match="no orientation"):
         Detector.from_file(MODEL).detect(image, None, read_lens_file(LENS).lens)
+
+
+TRACK = Track(7, "cup", 0.0, np.zeros(3), np.zeros(2), np.eye(4), 3)
+
+
+@pytest.fixture(scope="module")
+def several(detections):
+    """Detections of four objects of two classes, one of them beyond the edge of the image and one unseen."""
+    (ball,) = detections
+    objects = [
+        ball,
+        replace(ball, confidence=0.5, distance=4.0, outline=ball.outline - ball.outline.min(axis=0) - 3.0),
+        replace(ball, class_name="cup", confidence=0.4, distance=2.0, track=TRACK),
+        replace(ball, confidence=0.3, distance=9.0, outline=np.empty((0, 2)), radius=0.0),
+    ]
+    classes = *detections.manifest.classes, ObjectClass("cup", "object")
+    manifest = replace(detections.manifest, classes=classes)
+    return replace(detections, objects=tuple(objects), observation=replace(detections.observation, manifest=manifest))
+
+
+def test_boxes_hold_the_outlines_and_end_at_the_image(several):
+    boxes = several.xyxy
+    assert boxes.shape == (4, 4)
+    for box, each in zip(boxes[[0, 2]], (several[0], several[2]), strict=True):
+        np.testing.assert_allclose(box, [*each.outline.min(axis=0) + 0.5, *each.outline.max(axis=0) + 0.5])
+        assert (box[:2] < each.center).all()
+        assert (each.center < box[2:]).all()
+    assert boxes[1, :2].tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(boxes[1, 2:], several[1].outline.max(axis=0) + 0.5)
+    np.testing.assert_allclose(boxes[3], np.tile(several[3].center, 2) + 0.5)
+    assert several[:0].xyxy.shape == (0, 4)
+
+
+def test_a_slice_and_a_filter_keep_everything_but_the_other_objects(several):
+    for some, kept in ((several[1:], several.objects[1:]), (several.filter("cup"), several.objects[2:3])):
+        assert isinstance(some, Detections)
+        assert some.objects == kept
+        assert len(some) == len(kept)
+        assert some.observation is several.observation
+        assert some.field is several.field
+    assert several[-1] is several.objects[-1]
+
+
+def test_what_a_filter_leaves_out_is_not_drawn(detections):
+    none = detections.filter(max_distance=0.1)
+    assert len(none) == 0
+    assert none.timing_ms == detections.timing_ms
+    assert (none.draw() != detections.draw()).any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kept"),
+    [
+        ({}, (0, 1, 2, 3)),
+        ({"class_name": "ball"}, (0, 1, 3)),
+        ({"class_name": ("ball", "cup")}, (0, 1, 2, 3)),
+        ({"min_confidence": 0.4}, (0, 1, 2)),
+        ({"max_distance": 4.0}, (0, 1, 2)),
+        ({"min_distance": 2.0, "max_distance": np.float32(8.0)}, (1, 2)),
+        ({"class_name": {"ball"}, "min_confidence": 0.4, "min_distance": 3.0}, (1,)),
+        ({"class_name": []}, ()),
+    ],
+)
+def test_filter(several, arguments, kept):
+    assert several.filter(**arguments).objects == tuple(several.objects[each] for each in kept)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"class_name": "bal"}, "did you mean 'ball'"),
+        ({"class_name": ("cup", "line")}, "'line'"),
+        ({"class_name": 0.5}, "0.5"),
+        ({"min_confidence": "0.5"}, "min_confidence"),
+        ({"max_distance": math.nan}, "max_distance"),
+        ({"min_distance": None}, "min_distance"),
+    ],
+)
+def test_a_filter_that_can_not_be_is_refused(several, arguments, named):
+    with pytest.raises(InputError, match=named):
+        several.filter(**arguments)
+
+
+def test_rows_are_flat_and_say_what_the_json_says(several):
+    rows = several.to_rows()
+    assert {tuple(each) for each in rows} == {COLUMNS}
+    for row, each, box in zip(rows, several, several.xyxy, strict=True):
+        data = each.as_dict()
+        assert [row["x"], row["y"], row["z"]] == data["position"]
+        assert [row["center_x"], row["center_y"]] == data["center"]
+        assert [row["xmin"], row["ymin"], row["xmax"], row["ymax"]] == box.round(1).tolist()
+        assert {name: row[name] for name in COLUMNS if name in data and name != "track"} == {
+            name: data[name] for name in COLUMNS if name in data and name != "track"
+        }
+    assert [each["track"] for each in rows] == [None, None, 7, None]
+    assert all(isinstance(value, str | int | float | None) for row in rows for value in row.values())
+
+
+def test_a_table_is_saved(several, tmp_path):
+    odd = replace(several, objects=(replace(several[0], class_name='a, "b"'), *several.objects[1:]))
+    odd.save(tmp_path / "found.CSV")
+    with (tmp_path / "found.CSV").open(newline="", encoding="utf-8") as file:
+        read = list(csv.DictReader(file))
+    assert read == [{name: "" if value is None else str(value) for name, value in row.items()} for row in odd.to_rows()]
+    several[:0].save(str(tmp_path / "none.csv"))
+    assert (tmp_path / "none.csv").read_text() == ",".join(COLUMNS) + "\n"
+
+
+def test_pandas_takes_the_rows(several):
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame(several.to_rows())
+    assert tuple(table.columns) == COLUMNS
+    assert table.groupby("class").size().to_dict() == {"ball": 3, "cup": 1}
+
+
+def test_supervision_gets_the_objects(several):
+    supervision = pytest.importorskip("supervision")
+    made = several.to_supervision()
+    assert isinstance(made, supervision.Detections)
+    np.testing.assert_array_equal(made.xyxy, several.xyxy)
+    assert made.class_id.tolist() == [0, 0, 1, 0]
+    assert made.tracker_id.tolist() == [-1, -1, 7, -1]
+    assert made[made.confidence > 0.45].data["class_name"].tolist() == ["ball", "ball"]
+    assert made.data["position"].shape == (4, 3)
+    assert several[:2].to_supervision().tracker_id is None
+    assert len(several[:0].to_supervision()) == 0
+
+
+def test_without_supervision_the_error_says_how_to_install_it(several, monkeypatch):
+    monkeypatch.setitem(sys.modules, "supervision", None)  # an import of it fails, as where it is not installed
+    with pytest.raises(InputError, match="pip install supervision"):
+        several.to_supervision()

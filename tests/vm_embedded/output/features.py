@@ -54,7 +54,7 @@ def scene(view):
     yaw = math.atan2(view.heading[1, 0], view.heading[0, 0])
     kinds = ("L", "T", "X"), (-math.pi / 4, math.pi, 0.0)
     crossings = tuple(
-        Crossing(kind, place, math.remainder(heading + yaw, 2.0 * math.pi))
+        Crossing(kind, place, math.remainder(heading + yaw, 2.0 * math.pi), 0.77)
         for kind, heading, place in zip(*kinds, places, strict=True)
     )
     outer = ahead(view, (2.0, -3.4), (6.0, -3.2), (6.4, 3.2), (3.0, 3.6))
@@ -70,7 +70,7 @@ def full(view):
     random = np.random.default_rng(3)
     ends = random.uniform((-9.0, -9.0), (9.0, 9.0), (60, 2, 2))
     lines = tuple(Segment(each, random.uniform(100.0, 1900.0, (2, 2)), 0.8765) for each in ends)
-    crossings = tuple(Crossing("LTX"[i % 3], ends[i, 0], -2.3456) for i in range(40))
+    crossings = tuple(Crossing("LTX"[i % 3], ends[i, 0], -2.3456, 0.7654) for i in range(40))
     places = random.uniform((-9.99, -9.99), (-1.0, -1.0), (12, 2))
     robots = tuple(replace(made.robots[0], position=each, distance=float(np.hypot(*each))) for each in places)
     outer = random.uniform(-9.99, -1.0, (16, 2))

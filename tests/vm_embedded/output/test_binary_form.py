@@ -147,7 +147,7 @@ def test_a_text_that_is_too_long_is_cut(tmp_path):
 
 
 def test_the_tables_of_the_documentation_are_the_layout(tmp_path):
-    assert VERSION == 2
+    assert VERSION == 3
     assert read(tmp_path, state_message("ok", ""))["TYPES"] == RECORDS
     section = PAGE.split("### Binary form")[1].split("\n## ")[0]
     sizes = {name: int(size) for name, size in re.findall(r"^\| `(\w+)` \| (\d+) \|", section, re.MULTILINE)}

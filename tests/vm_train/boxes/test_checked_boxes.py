@@ -50,10 +50,10 @@ def test_a_box_is_left_out_if_one_before_it_that_stays_is_the_same(boxes):
             said.append(f"{each.place}: the same box of {each.name} as {' '.join(same[0].split()[-2:])}; box not used")
         else:
             kept += [(each.place, box) for box in single]
-            said += checked.faults
+            said += [finding.text for finding in checked.findings]
             unusable += checked.unusable
     assert found.good == [box for _, box in kept]
-    assert found.faults == said
+    assert [finding.text for finding in found.findings] == said
     assert found.unusable == unusable
 
 
@@ -80,5 +80,5 @@ def test_thousands_of_boxes_are_compared_with_few(spread, monkeypatch):
     high = low + 20.0 * (1.0 + spread * sides)
     edges = [(*one, *other) for one, other in zip(low.tolist(), high.tolist(), strict=True)]
     found = checked_boxes([RawBox(f"a.txt line {at}", "ball", each) for at, each in enumerate(edges)], SIZE, ())
-    assert len(found.good) + len(found.faults) == count
+    assert len(found.good) + len(found.findings) == count
     assert len(compared) < 50 * count

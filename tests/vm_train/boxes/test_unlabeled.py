@@ -30,6 +30,6 @@ def test_sightings_without_a_box_of_their_class_are_told_once():
     found = without_box(pictures, sightings)
     assert found == [sightings[3], sightings[1], sightings[4]]
     assert without_box(pictures, reversed(sightings)) == found
-    assert describe(found[0], FOLDER) == (
+    assert describe(found[0], FOLDER).text == (
         "sub/b.jpg: without a box, but looks like a ball: x 32, y 40, 20 x 20 px (probability 0.970)"
     )

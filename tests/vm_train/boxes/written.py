@@ -96,6 +96,6 @@ WRITERS = {"yolo": write_yolo, "voc": write_voc, "coco": write_coco}
 
 
 def boxes_of(folder, **options):
-    """Boxes of the usable pictures, by the stem of the image, and all faults."""
+    """Boxes of the usable pictures, by the stem of the image, and all faults and remarks."""
     found = read_boxes(folder, **options)
-    return {each.image.stem: each.boxes for each in found.pictures}, list(found.faults)
+    return {each.image.stem: each.boxes for each in found.pictures}, [each.text for each in found.findings]

@@ -13,7 +13,7 @@ from vm_train.boxes.read import read_boxes
 from vm_train.boxes.summary import name_faults
 from vm_train.cli.box_options import parse_names
 
-from ..boxes.written import WRITERS, write_voc, write_yolo
+from ..boxes.written import WRITERS, write_image, write_voc, write_yolo
 from ..commands import run, run_module
 
 PICTURES = {
@@ -55,21 +55,53 @@ def test_good_boxes_are_counted(format, tmp_path):
 def test_faults_are_told_and_the_rest_is_counted(tmp_path):
     write_yolo(tmp_path, {**PICTURES, "bad": []})
     (tmp_path / "bad.txt").write_text("0 0.5 0.5 0.1\n" * 45)
-    done = run("check", tmp_path, "--boxes", code=1)
-    lines = done.stderr.splitlines()
-    assert lines[0] == (
-        "vm-train: bad.txt line 1: '0 0.5 0.5 0.1' has 4 values; allowed: class x y width height, and perhaps a "
+    (tmp_path / "no image.txt").write_text("0 0.5 0.5 0.1 0.1\n")
+    command = ("check", tmp_path, "--boxes", "--no-look", "--names", "fußball=ball")
+    done = run(*command, code=1)
+    grouped, single, more = done.stderr.splitlines()
+    first = (
+        "bad.txt line 1: '0 0.5 0.5 0.1' has 4 values; allowed: class x y width height, and perhaps a "
         "confidence; or class and three or more corners x y; bad.jpg not used"
     )
-    assert len(lines) == 41
-    assert lines[-1] == "vm-train: and 6 more; vm-train check --boxes --json FILE lists all"
-    assert done.stdout.startswith("3 pictures can be used, of 2 recordings; 45 faults\n")
+    assert grouped.startswith("vm-train: 45 ")
+    assert grouped.endswith(first)
+    assert single.startswith("vm-train: no image.txt: ")
+    assert "--verbose" in more
+    assert done.stdout.startswith("3 pictures can be used, of 2 recordings; 46 faults\n")
+    every = run(*command, "--verbose", code=1).stderr.splitlines()
+    assert (len(every), every[0], every[-1]) == (46, f"vm-train: {first}", single)
+
+
+def test_remarks_are_no_faults(tmp_path):
+    """Photos that a phone turned, and balls behind a goalpost: all boxes are used."""
+    frames = {f"cam{number}_1": [("ball", 20.0, 30.0, 40.0, 50.0)] for number in range(5)}
+    write_yolo(tmp_path, frames)
+    for name in list(frames)[:3]:
+        write_image(tmp_path / f"{name}.jpg", size=(120, 160), orientation=6)
+    (tmp_path / "cam4_1.txt").write_text("0 0.5 0.5 0.1 0.5\n")
+    found = tmp_path / "found.json"
+    done = run("check", tmp_path, "--boxes", "--no-look", "--json", found)
+    assert done.stdout.startswith("5 pictures can be used, of 5 recordings; 0 faults, 4 remarks\n")
+    turned, hidden, more = done.stderr.splitlines()
+    assert turned.startswith("vm-train: 3 ")
+    assert "cam0_1.jpg" in turned
+    assert "cam4_1.txt line 1" in hidden
+    assert "--verbose" in more
+    kept = json.loads(found.read_text())
+    assert (kept["faults"], len(kept["remarks"])) == ([], 4)
+
+
+def test_a_wrong_name_is_counted_and_a_fault(tmp_path):
+    write_yolo(tmp_path, {"a1": [("Bal", 20.0, 30.0, 40.0, 50.0)], "a2": [("ball", 20.0, 30.0, 40.0, 50.0)]})
+    done = run("check", tmp_path, "--boxes", "--no-look", code=1)
+    assert done.stdout.startswith("2 pictures can be used, of 1 recordings; 1 fault\n")
+    assert "Bal" in done.stderr
 
 
 def test_misspelled_and_missing_classes_are_told(tmp_path):
     write_voc(tmp_path, {"a1": [("Bal", 20.0, 30.0, 40.0, 50.0)], "a2": [("robot", 20.0, 30.0, 40.0, 50.0)]})
     found = read_boxes(tmp_path)
-    misspelled, missing = name_faults(found, ["ball"])
+    misspelled, missing = (each.text for each in name_faults(found, ["ball"]))
     assert misspelled == (
         "class 'Bal' (1 box, the first in a1.jpg): did you mean 'ball'? Rename it with --names 'Bal=ball'"
     )
@@ -118,7 +150,8 @@ def test_a_clear_ball_without_a_box_is_told(tmp_path):
     assert run("check", saved, "--boxes").stderr == ""
     (saved / clearest["image"]).with_suffix(".txt").write_text("")
     sheet = tmp_path / "sheet.jpg"
-    done = run("check", saved, "--boxes", "--sheet", sheet, code=1)
+    done = run("check", saved, "--boxes", "--sheet", sheet)
+    assert "; 0 faults, 1 remark\n" in done.stdout
     *_, told, advice = done.stderr.splitlines()
     assert told.startswith(start)
     assert done.stderr.count(start) == 1

@@ -20,6 +20,8 @@ from vm_export.checkpoint import Checkpoint
 from vm_train.learning.folder_access import locked
 from vm_train.learning.log import read_log
 
+VALIDATION = "validation_average_precision"
+
 
 def same_network(first, second):
     return same(weights_of(first), weights_of(second))
@@ -28,7 +30,7 @@ def same_network(first, second):
 def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
     folder, done = whole
     assert re.search(r"30 pictures: \d+ for training, \d+ for validation, \d+ for test", done.stdout)
-    assert re.search(r"model\.pt: average precision 0\.\d+ on the validation, \d+ pictures/s", done.stdout)
+    assert re.search(r"model\.pt: validation AP 0\.\d+, \d+ pictures/s", done.stdout)
     assert f"\nnext: vm-train look {data} --from {folder / 'model.pt'} -o {folder}-look\nnext: vm-export" in done.stdout
     assert {path.name for path in folder.iterdir()} == {
         "train.toml",
@@ -48,11 +50,19 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
     assert [(each["round"], each["step"]) for each in steps] == [
         (each, step) for each in (1, 2) for step in range(1, 3 * -(-count // 4) + 1)
     ]
-    assert [each["epoch"] for each in records if "score" in each] == [1, 2, 3, 1, 2, 3]
-    shown = re.findall(r"^round (\d), epoch (\d) of 3: loss (\d\.\d{3}), score (\d\.\d{3})", done.stdout, re.MULTILINE)
-    scores = [each for each in records if "score" in each]
+    assert [each["epoch"] for each in records if VALIDATION in each] == [1, 2, 3, 1, 2, 3]
+    assert "validation AP: average precision of the mesh points of ball" in done.stdout
+    shown = re.findall(
+        r"^round (\d) of 2, epoch (\d) of 3: loss (\d\.\d{3}), validation AP (\d\.\d{3})(?: \(the best so far\))?, "
+        r"learning rate ([\d.e-]+), \d+ pictures/s, 0:00:\d\d left$",
+        done.stdout,
+        re.MULTILINE,
+    )
+    scores = [each for each in records if VALIDATION in each]
+    rates = {(each["round"], each["step"]): each["rate"] for each in steps}
+    assert [each[4] for each in shown] == [f"{rates[each['round'], each['step']]:.2g}" for each in scores]
     assert [tuple(map(int, each[:2])) for each in shown] == [(each["round"], each["epoch"]) for each in scores]
-    assert [each[3] for each in shown] == [f"{each['score']:.3f}" for each in scores]
+    assert [each[3] for each in shown] == [f"{each[VALIDATION]:.3f}" for each in scores]
     first = [each["loss"] for each in steps[: len(steps) // 6]]
     assert shown[0][2] == f"{sum(first) / len(first):.3f}"
     assert len(list((folder / "tensorboard" / "round2").glob("events*"))) == 1
@@ -63,7 +73,7 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
 
 
 @pytest.mark.long
-def test_at_a_terminal_the_bar_shows_epoch_loss_and_score(data, configuration, tmp_path):
+def test_at_a_terminal_the_bar_shows_epoch_loss_and_validation(data, configuration, tmp_path):
     main, terminal = pty.openpty()
     command = [*COMMAND, data, "-o", tmp_path / "run", "--config", configuration]
     with subprocess.Popen(
@@ -77,7 +87,7 @@ def test_at_a_terminal_the_bar_shows_epoch_loss_and_score(data, configuration, t
     os.close(main)
     assert process.returncode == 0
     assert re.search(rb"left, epoch 1, loss \d\.\d{3}\x1b", shown)
-    assert re.search(rb"left, epoch 3, loss \d\.\d{3}, score \d\.\d{3}\x1b", shown)
+    assert re.search(rb"left, epoch 3, loss \d\.\d{3}, validation AP \d\.\d{3}\x1b", shown)
 
 
 def test_its_network_is_exported_with_its_provenance(whole, tmp_path):
@@ -156,7 +166,7 @@ def test_two_processes_have_the_same_loss_curve(whole, data, configuration, tmp_
     ]
     assert curves[1] == pytest.approx(curves[0], rel=2e-3)
     scores = [
-        [record["score"] for _, record in read_log(folder / "log.jsonl") if "score" in record]
+        [record[VALIDATION] for _, record in read_log(folder / "log.jsonl") if VALIDATION in record]
         for folder in (whole[0], tmp_path / "run")
     ]
     assert scores[1] == pytest.approx(scores[0], abs=0.02)

@@ -12,6 +12,8 @@ from tests.vm_train.drawn import CLASSES, draw_set
 from vm_export.checkpoint import Checkpoint
 from vm_train.learning.log import read_log
 
+VALIDATION = "validation_average_precision"
+
 
 @pytest.mark.long
 def test_a_validation_without_objects_chooses_by_all_classes(data, configuration, tmp_path):
@@ -19,8 +21,8 @@ def test_a_validation_without_objects_chooses_by_all_classes(data, configuration
     assert without
     (tmp_path / "validation.txt").write_text("\n".join(f"{each:04d}" for each in without))
     done = run(data, "-o", tmp_path / "run", "--config", configuration, "--validation", tmp_path / "validation.txt")
-    assert "the validation pictures show no ball: the score is the mean average precision of all classes" in done.stderr
-    scores = [record["score"] for _, record in read_log(tmp_path / "run" / "log.jsonl") if "score" in record]
+    assert "the validation pictures show no ball: the validation AP is the mean of all classes" in done.stderr
+    scores = [record[VALIDATION] for _, record in read_log(tmp_path / "run" / "log.jsonl") if VALIDATION in record]
     assert min(scores) > 0.0
 
 

@@ -47,8 +47,8 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
         assert re.fullmatch(rf"{stage}: \d+ patches of your frames, \d+ of them show the object", lines[start])
         for epoch in (1, 2):
             assert re.fullmatch(
-                rf"{stage}, epoch {epoch} of 2: loss [\d.]+ for your frames, [\d.]+ for rendered patches, "
-                r"with \d+0% of the new weights",
+                rf"{stage}, epoch {epoch} of 2: validation loss [\d.]+ for your frames, [\d.]+ for rendered patches, "
+                r"with \d+0% of the new weights; loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
                 lines[start + epoch],
             )
     assert re.search(r"model.onnx: in 4 frames for validation, it finds \d+ of \d+ boxes and \d+ false", lines[7])
