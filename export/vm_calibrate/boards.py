@@ -137,7 +137,9 @@ class CharucoBoard:
     def _markers_in(self, gray: Image) -> tuple[Sequence[Singles], npt.NDArray[np.int32]]:
         """Corners of the visible markers (1, 4, 2) [px], and their numbers (n,)."""
         _, _, corners, numbers = self._detector.detectBoard(gray)
-        return (corners, numbers.ravel()) if numbers is not None else ([], np.zeros(0, dtype=np.int32))
+        if numbers is None:
+            return [], np.zeros(0, dtype=np.int32)
+        return [np.asarray(each, dtype=np.float32) for each in corners], np.asarray(numbers, dtype=np.int32).ravel()
 
 
 Board = Chessboard | CharucoBoard

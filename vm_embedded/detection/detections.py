@@ -106,8 +106,8 @@ class Detections:
         """The same Detections with some of their objects; the points and features of the field stay.
 
         class_name: one class or several; None: all. min_confidence: 0 to 1. min_distance, max_distance [m]: from the
-        camera to the object's center. Each limit is included. Raises InputError for a class that gives no objects, and if
-        a limit is not a number.
+        camera to the object's center. Each limit is included. Raises InputError for a class that gives no objects, and
+        if a limit is not a number.
         """
         names = self._object_classes()
         chosen = names if class_name is None else _listed(class_name)
