@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Image, Singles
+from vm_embedded.arrays import Floats, Image
 from vm_embedded.errors import InputError, unknown
 
 FEWEST_CORNERS = 8
@@ -118,7 +116,7 @@ class CharucoBoard:
         corners, numbers = self._markers_in(gray)
         if len(numbers) < _FEWEST_MARKERS:
             return None
-        pixels, count = np.concatenate(corners).reshape(-1, 2).astype(np.float64), int(numbers.max()) + 1
+        pixels, count = corners.reshape(-1, 2), max(numbers) + 1
         fits = []
         for columns in range(3, _MOST_COLUMNS + 1):
             rows = max(-(-2 * count // columns), 3)
@@ -134,10 +132,11 @@ class CharucoBoard:
         change = "" if best.legacy == self.legacy else " --legacy" if best.legacy else " without --legacy"
         return f"{best.columns}x{best.rows}{change}"
 
-    def _markers_in(self, gray: Image) -> tuple[Sequence[Singles], npt.NDArray[np.int32]]:
-        """Corners of the visible markers (1, 4, 2) [px], and their numbers (n,)."""
+    def _markers_in(self, gray: Image) -> tuple[Floats, list[int]]:
+        """Corners (n, 4, 2) of the visible markers [px], and their n numbers."""
         _, _, corners, numbers = self._detector.detectBoard(gray)
-        return (corners, numbers.ravel()) if numbers is not None else ([], np.zeros(0, dtype=np.int32))
+        found = [] if numbers is None else np.asarray(numbers).ravel().tolist()
+        return np.array(corners, dtype=np.float64).reshape(-1, 4, 2), found
 
 
 Board = Chessboard | CharucoBoard
