@@ -135,7 +135,7 @@ class CharucoBoard:
     def _markers_in(self, gray: Image) -> tuple[Floats, list[int]]:
         """Corners (n, 4, 2) of the visible markers [px], and their n numbers."""
         _, _, corners, numbers = self._detector.detectBoard(gray)
-        found = [] if numbers is None else np.asarray(numbers).ravel().tolist()
+        found = [] if numbers is None else [int(each) for each in np.asarray(numbers).ravel()]
         return np.array(corners, dtype=np.float64).reshape(-1, 4, 2), found
 
 
