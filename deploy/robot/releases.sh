@@ -3,7 +3,8 @@
 #
 #   PREFIX/releases/ID/bundle   the bundle without its wheels
 #   PREFIX/releases/ID/venv     the program
-#   PREFIX/releases/ID/etc      vm.toml, model and lens in use; .old.onnx while a new model is on trial
+#   PREFIX/releases/ID/etc      vm.toml, model and lens in use; .old.onnx while a new model is on trial;
+#                               .previous.onnx, the model before, if the last change was one of the model
 #   PREFIX/releases/ID/complete written last: a release without it is incomplete
 #   PREFIX/current, previous    links to releases; the unit starts `current`
 #   PREFIX/trial                the two links before the switch; exists until `current` has proved healthy
@@ -169,7 +170,7 @@ $older" || return 1
             return 1
         fi
     fi
-    rm -f "$PREFIX/trial"
+    rm -f "$PREFIX/trial" "$PREFIX/current/etc/.previous.onnx" # the last change is one of the release
     trap - INT TERM HUP
     sync
 }
@@ -196,11 +197,23 @@ restore_model() { # bring the old model back
     sync
 }
 
+keep_old_model() { # for vm-deploy rollback: the new one is accepted
+    [ -e "$PREFIX/current/etc/.old.onnx" ] || return 0
+    if cmp -s "$PREFIX/current/etc/.old.onnx" "$PREFIX/current/etc/model.onnx"; then
+        rm -f "$PREFIX/current/etc/.old.onnx"
+    else
+        mv -f "$PREFIX/current/etc/.old.onnx" "$PREFIX/current/etc/.previous.onnx"
+    fi
+}
+
 finish_trial() { # of an interrupted command: keep the release and the model on trial if the detector is ok
     [ -e "$PREFIX/trial" ] || [ -e "$PREFIX/current/etc/.old.onnx" ] || return 0
     say "an earlier install.sh or vm-deploy was interrupted"
     case $(if uses_systemd && systemd_runs; then state; else say ok; fi) in
-    ok*) rm -f "$PREFIX/trial" "$PREFIX/current/etc/.old.onnx" ;;
+    ok*)
+        keep_old_model
+        rm -f "$PREFIX/trial"
+        ;;
     *) end_trial ;;
     esac
 }

@@ -13,7 +13,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from ..borders.credentials import password_hint, without_password
-from ..cameras.camera import CameraSettings
+from ..cameras.camera import CameraSettings, Shot
 from ..cameras.grabber import Grabber
 from ..cameras.open_camera import brings_lens_and_pose, camera_opener, is_live
 from ..cameras.opencv import device_path
@@ -33,11 +33,13 @@ _PATIENCE = 3.0
 """How long to wait for the host of a camera [s]."""
 
 
-def check_cameras(camera: CameraSettings, raw: bool, fault: str, is_running: bool, dev: Path) -> Iterator[Finding]:
+def check_cameras(
+    camera: CameraSettings, raw: bool, fault: str, is_running: bool, dev: Path, shots: list[Shot]
+) -> Iterator[Finding]:
     """Whether each video device can be opened, and whether the configured camera delivers frames.
 
     camera, raw: as for `camera_opener`. fault: why it can never work, empty if it can. is_running: whether a detector
-    reads it now; many cameras serve only one reader. dev: folder with the devices.
+    reads it now; many cameras serve only one reader. dev: folder with the devices. shots: gets the frames.
     """
     source = camera.source
     nodes = sorted(dev.glob("video*"))
@@ -53,7 +55,7 @@ def check_cameras(camera: CameraSettings, raw: bool, fault: str, is_running: boo
         finding = _check_configured_device(source, device, nodes, dev)
         yield finding
         if finding.state != BAD and not is_running and dev == Path("/dev"):
-            yield _check_frames(camera, raw)
+            yield _check_frames(camera, raw, shots)
     elif not is_live(source) or brings_lens_and_pose(source):
         yield Finding("camera", GOOD, source)
     elif refused := _refused_connection(source):
@@ -63,7 +65,7 @@ def check_cameras(camera: CameraSettings, raw: bool, fault: str, is_running: boo
     elif is_running:
         yield Finding("camera", GOOD, f"{without_password(source)}; a detector is running")
     else:
-        yield _check_frames(camera, raw)
+        yield _check_frames(camera, raw, shots)
 
 
 def _check_configured_device(source: str, device: Path, nodes: Sequence[Path], dev: Path) -> Finding:
@@ -81,16 +83,16 @@ def _check_configured_device(source: str, device: Path, nodes: Sequence[Path], d
     )
 
 
-def _check_frames(camera: CameraSettings, raw: bool) -> Finding:
+def _check_frames(camera: CameraSettings, raw: bool, shots: list[Shot]) -> Finding:
     """Whether the camera delivers frames that can be used, read and decoded as by a detector."""
     grabber, shown = Grabber(camera_opener(camera, raw), camera, lambda: None), without_password(camera.source)
-    began, size = time.monotonic(), ""
+    began = time.monotonic()
     grabber.start()
     counts = grabber.counts
     while counts.grabbed < _FRAMES and counts.rejected < _MOST_REJECTED and not grabber.ended:
         shot = grabber.take()
         if shot is not None:
-            size = f"{shot.image.shape[1]} x {shot.image.shape[0]} px"
+            shots.append(shot)
         lost = grabber.supervise(time.monotonic())
         if lost and grabber.trouble and (counts.reconnects or time.monotonic() - began > _PATIENCE):
             break
@@ -103,7 +105,8 @@ def _check_frames(camera: CameraSettings, raw: bool) -> Finding:
             f"{shown}: {counts.rejected} of {counts.grabbed + counts.rejected} frames can't be used: {grabber.trouble}"
         )
         return Finding("camera", WARNING, seen, "check cable and network of the camera")
-    return Finding("camera", GOOD, f"{shown} delivers frames of {size}")
+    height, width = shots[-1].image.shape[:2]
+    return Finding("camera", GOOD, f"{shown} delivers frames of {width} x {height} px")
 
 
 def _refused_connection(source: str) -> str:

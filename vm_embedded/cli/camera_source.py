@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 
+from ..cameras.camera import Shot
 from ..cameras.image_files import lens_beside, open_source
 from ..cameras.open_camera import ROS, camera_opener, is_live
 from ..cameras.ros.bags import is_bag
@@ -11,6 +14,12 @@ from ..geometry.lens import Size
 from ..geometry.lens_files import LensFile, read_lens_file
 from ..live.configuration import Configuration
 from ..poses.settings import check_without_ros
+from .default_pose import DefaultPose
+from .detect_files import open_frames
+from .frame_trial import Sample
+
+_FRAMES = 5
+"""Frames of files to search."""
 
 
 @dataclass(frozen=True)
@@ -46,3 +55,30 @@ def check_pose_source(configuration: Configuration) -> None:
     camera = configuration.camera.source
     if camera not in ("", ROS) and not is_bag(camera):
         check_without_ros(configuration.pose.source)
+
+
+def samples_of(configuration: Configuration, shots: Iterable[Shot]) -> list[Sample]:
+    """The first frames of files, or the shots that a live camera has delivered, with their lenses and fixed poses.
+
+    Of a live camera, there are none without a lens or a fixed pose, whose own checks tell that. Raises InputError for
+    files with a damaged frame, or without lens or pose.
+    """
+    camera = configuration.camera
+    if camera.source and not is_live(camera.source):
+        return list(_file_samples(configuration))
+    orientation = configuration.fixed_orientation() if configuration.pose.source == "fixed" else None
+    samples = []
+    for number, shot in enumerate(shots, start=1):
+        lens = shot.lens or configuration.lens_for((shot.image.shape[1], shot.image.shape[0]))
+        pose = shot.orientation or orientation
+        if lens is not None and pose is not None:
+            samples.append(Sample(f"frame {number}", shot.image, lens, pose))
+    return samples
+
+
+def _file_samples(configuration: Configuration) -> Iterator[Sample]:
+    default = DefaultPose(configuration, configuration.fixed_orientation())
+    for frame in islice(open_frames([configuration.camera.source], configuration).frames, _FRAMES):
+        image = frame.read()
+        lens, orientation = default.of(frame, (image.shape[1], image.shape[0]))
+        yield Sample(frame.source, image, lens, orientation)

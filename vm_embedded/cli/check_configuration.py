@@ -27,7 +27,8 @@ def check_configuration(configuration: Configuration, with_ros: bool) -> str:
         if finding.state == BAD:
             raise InputError(f"{finding.about}: {finding.seen}")
     model, proved = asyncio.run(prove_model(configuration))
-    good = f"{configuration.model}: {len(model.manifest.classes)} classes, {proved}; the configuration is good"
+    names = ", ".join(each.name for each in model.manifest.classes)
+    good = f"{configuration.model}: classes {names}; {proved}; the configuration is good"
     if configuration.camera.source:
         return good
     return f"{good}, but names no camera: set [camera] source, or give --camera"

@@ -12,6 +12,7 @@ from importlib import metadata
 from pathlib import Path
 
 from ..borders.sockets import is_listening
+from ..cameras.camera import Shot
 from ..cameras.open_camera import brings_lens_and_pose, is_live
 from ..cameras.ros.bags import is_bag
 from ..errors import InputError, VisualMeshError, one_line
@@ -22,8 +23,9 @@ from ..live.control import control_path
 from ..live.load_detector import check_height, prove_network
 from ..network.model_file import ModelFile
 from .camera_checks import check_cameras
-from .camera_source import SourceFacts, check_pose_source, check_source
+from .camera_source import SourceFacts, check_pose_source, check_source, samples_of
 from .finding import BAD, GOOD, WARNING, Finding
+from .frame_trial import check_detection
 from .machine_checks import check_clock, check_governor, check_opencv, check_processor, check_threads
 from .openings import check_openings
 
@@ -46,9 +48,12 @@ def run_checks(configuration: Configuration, root: Path = Path("/")) -> Iterator
         except VisualMeshError as error:
             fault = str(error)
         raw = configuration.detector.format != "bgr"
-        yield from check_cameras(configuration.camera, raw, fault, _is_running(configuration), root / "dev")
+        shots: list[Shot] = []
+        yield from check_cameras(configuration.camera, raw, fault, _is_running(configuration), root / "dev", shots)
         yield check_lens(configuration, source)
         yield check_pose(configuration, source, model)
+        if model is not None and not fault:
+            yield from _check_frames(configuration, model, shots)
         yield check_clock(root / "sys/devices/system/clocksource/clocksource0/current_clocksource", time.time())
         yield from check_openings(configuration)
     except OSError as error:
@@ -75,6 +80,17 @@ def check_model(configuration: Configuration) -> tuple[Finding, ModelFile | None
             "model", WARNING, seen, "vm-export --canary IMAGE LENS writes a picture that it must find"
         ), model
     return Finding("model", GOOD, seen), model
+
+
+def _check_frames(configuration: Configuration, model: ModelFile, shots: list[Shot]) -> Iterator[Finding]:
+    """What the detector sees in the user's frames; nothing if a camera gave none, or has no lens or pose."""
+    try:
+        samples = samples_of(configuration, shots)
+    except VisualMeshError as error:
+        yield Finding("detection", WARNING, str(error), "see camera, lens and pose")
+        return
+    if samples:
+        yield check_detection(model, configuration.detector, samples)
 
 
 def check_lens(configuration: Configuration, source: SourceFacts) -> Finding:

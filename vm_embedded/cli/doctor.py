@@ -21,7 +21,7 @@ def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="vm-doctor",
         description="Check processor, packages, model, camera, lens, pose, outputs and clock, and say how to fix "
-        "problems.",
+        "problems. Search frames of the camera, and say how many points, proposals and objects they have.",
         epilog="Exit status: 0 no failure (there may be warnings), 1 at least one failure, 2 wrong usage.",
     )
     parser.add_argument("--camera", metavar="SOURCE", help="as for vm-detect")

@@ -338,6 +338,12 @@ class Daemon:
             reason = str(error) if isinstance(error, VisualMeshError) else one_line(error)
             self._log("reload refused", "error", reason=reason)
             return
+        had, has = (
+            ", ".join(each.name for each in detector.manifest.classes)
+            for detector in (self.answerer.detector, new.detector)
+        )
+        if had != has:
+            self._log("other classes", "warning", before=had, now=has)
         self.answerer.reload(new.configuration, new.detector)
         self._begin_recording_anew()
         self._remarks = FrameRemarks()

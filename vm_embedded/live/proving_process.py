@@ -1,4 +1,4 @@
-"""Prove that a model file works in a child process with limits, so that a file of an enemy can't hurt the detector.
+"""Run a model file in a child process with limits, so that a file of an enemy can't hurt the detector: its proof.
 
 The parent reads the file once, and the child gets its bytes: nobody can change the file between the two.
 """
@@ -11,8 +11,10 @@ import os
 import resource
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,10 +24,10 @@ from ..network.model_file import parse_model
 from .proof import prove
 
 _LONGEST_S, _PROCESSOR_S = 25.0, 15
-"""Limits of the whole proof, and of its processor time after the imports [s]. The unit's TimeoutStartSec is 30 s."""
+"""Limits of the whole run, and of its processor time after the imports [s]. The unit's TimeoutStartSec is 30 s."""
 
 _MEMORY_MIB = 1024
-"""Limit of the memory that the proof may add [MiB]; the networks of the package add 120."""
+"""Limit of the memory that the run may add [MiB]; the networks of the package add 120."""
 
 _NOBODY = 65534
 """User and group without rights, if the parent is root."""
@@ -33,9 +35,19 @@ _NOBODY = 65534
 
 async def prove_in_process(path: str | Path, content: bytes) -> str:
     """Like `prove`, for the content of a model file, in another process. path: for messages. Raises ModelError."""
+    answer = await ask_limited_process("vm_embedded.live.proving_process", path, content)
+    return str(answer["proved"])
+
+
+async def ask_limited_process(module: str, path: str | Path, content: bytes) -> dict[str, Any]:
+    """The answer of a module of this package that runs in another process, and there calls `answer_limited`.
+
+    path: of the model, for messages and the child. content: its standard input. Don't trust the answer: a hostile
+    network may have written it. Raises ModelError.
+    """
     try:
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-m", "vm_embedded.live.proving_process", str(path)),
+            *(sys.executable, "-m", module, str(path)),
             cwd=Path(__file__).parents[2],  # the only folder that -m adds to the path of modules
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
@@ -54,12 +66,12 @@ async def prove_in_process(path: str | Path, content: bytes) -> str:
             await process.wait()
     try:
         answer = json.loads(output)
-        proved, refusal = str(answer["proved"]), str(answer["refusal"])
+        refusal, found = str(answer["refusal"]), dict(answer["found"])
     except (ValueError, KeyError, TypeError) as error:
         raise ModelError(f"{path}: {_end(process.returncode)}") from error
     if refusal:
         raise ModelError(refusal)
-    return proved
+    return found
 
 
 def _end(status: int | None) -> str:
@@ -71,18 +83,23 @@ def _end(status: int | None) -> str:
     return f"its proof ended with status {status} and without an answer"
 
 
-def main(path: str) -> None:
-    """The child: prove the model file on standard input, and print the answer as a line of JSON."""
+def answer_limited(path: str, work: Callable[[bytes], dict[str, Any]]) -> None:
+    """The child: limit this process, call `work` with standard input, and print its answer as a line of JSON."""
     cv2.setNumThreads(1)
     _limit_this_process()
-    proved = refusal = ""
+    found, refusal = dict[str, Any](), ""
     try:
-        proved = prove(parse_model(path, sys.stdin.buffer.read()))
+        found = work(sys.stdin.buffer.read())
     except VisualMeshError as error:
         refusal = str(error)
     except (MemoryError, cv2.error) as error:
         refusal = f"{path}: its proof failed: {one_line(error) or 'not enough memory'}"
-    print(json.dumps({"proved": proved, "refusal": refusal}))
+    print(json.dumps({"found": found, "refusal": refusal}))
+
+
+def main(path: str) -> None:
+    """The child: prove the model file on standard input."""
+    answer_limited(path, lambda content: {"proved": prove(parse_model(path, content))})
 
 
 def _limit_this_process() -> None:

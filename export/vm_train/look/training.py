@@ -119,8 +119,8 @@ class _Training:
         self._progress.validated += 1
         log.write(self._trainer.done, {"epoch": self._progress.validated} | asdict(score))
         self._bar.clear()
-        finished = f"epoch {self._progress.validated} of {self._recipe.epochs}"
-        print(f"{finished}: {_description(score)}; {learned}", flush=True)
+        number = f"epoch {self._progress.validated} of {self._recipe.epochs}"
+        print(f"{number}: {_description(score)}; {learned}", flush=True)
         self._save()
         return True
 

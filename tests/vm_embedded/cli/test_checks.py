@@ -1,6 +1,7 @@
 """What vm-doctor finds on a good machine and on bad ones."""
 
 import os
+import re
 from dataclasses import replace
 
 import cv2
@@ -8,11 +9,13 @@ import numpy as np
 import pytest
 
 from tests.drawn_scenes import FOLDER
+from tests.rooms import CHECKOUT
 from tests.vm_embedded.cameras.mjpeg_server import Server
-from vm_embedded.cameras.camera import CameraSettings
-from vm_embedded.cli.camera_source import SourceFacts, check_source
+from vm_embedded.cameras.camera import CameraSettings, Shot
+from vm_embedded.cli.camera_source import SourceFacts, check_source, samples_of
 from vm_embedded.cli.checks import check_lens, check_pose, run_checks
 from vm_embedded.cli.finding import BAD, GOOD, WARNING
+from vm_embedded.cli.frame_trial import check_detection
 from vm_embedded.cli.machine_checks import check_clock, check_opencv, check_threads
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import LensFile, format_lens_file
@@ -220,6 +223,41 @@ def test_a_live_camera_without_lens_or_pose_is_a_failure_of_these_and_not_of_the
     assert "refused" in seen["camera"].seen
     assert [seen[name].state for name in ("camera", "lens", "pose")] == [BAD, GOOD, GOOD]
     assert seen["pose"].seen == "height 0.5 m, pitch 5.7 deg, roll 0 deg"
+
+
+def detection(given, shots=()):
+    """What vm-doctor says about the detection in frames."""
+    return check_detection(read_model(model_path(given.model)), given.detector, samples_of(given, shots))
+
+
+def test_what_the_detector_sees_in_the_frames_is_shown():
+    demo = Configuration(camera=CameraSettings(source=str(CHECKOUT / "tests/fixtures/demo")))
+    seen = detection(demo)
+    assert seen.state == GOOD
+    assert re.search(r"5 frames has \d+ to \d+ points, \d+ to \d+ proposals, (1|\d to \d) ball$", seen.seen), seen
+    small = detection(replace(demo, detector=Settings(object_radius=0.3)))
+    assert (small.state, "0 ball" in small.seen, "0.3" in small.mend) == (WARNING, True, True), small
+
+
+def test_what_the_detector_sees_through_a_camera_is_shown():
+    images = [cv2.imread(str(CHECKOUT / f"tests/fixtures/demo/image000000{each}.jpg")) for each in range(2)]
+    shots = [Shot(each, 0.0) for each in images]
+    given = Configuration(camera=CameraSettings(source="/dev/video0"), fov=1.2)
+    assert samples_of(given, shots) == []
+    posed = replace(given, orientation=FixedPose(height=0.66, pitch=0.39))
+    assert len(samples_of(posed, shots)) == 2
+    assert samples_of(replace(posed, pose=PoseSettings(source="udp:0.0.0.0:5600")), shots) == []
+    up = detection(replace(posed, orientation=FixedPose(height=0.66, pitch=-1.5)), shots)
+    assert (up.state, "2 frames has 0 points" in up.seen, "--pitch" in up.mend) == (WARNING, True, True), up
+
+
+def test_frames_that_do_not_fit_the_lens_are_a_failure_of_the_detection():
+    narrow = replace(HEALTHY.lens.lens, size=(1280, 960))
+    given = Configuration(
+        camera=CameraSettings(source="0"), lens=LensFile(narrow, None), orientation=FixedPose(height=0.6)
+    )
+    seen = detection(given, [Shot(np.zeros((512, 640, 3), dtype=np.uint8), 0.0)])
+    assert (seen.state, "640 x 512" in seen.seen) == (BAD, True), seen
 
 
 def test_where_poses_come_from_is_shown(root):

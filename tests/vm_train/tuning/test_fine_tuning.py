@@ -90,7 +90,7 @@ def test_frames_without_validation_measure_nothing_and_those_with_lenses_can_be_
         shutil.copy(lens, image.with_suffix(".yaml"))
     done = tune(tmp_path / "run", "--boxes", seen, "--set", "data.validation=0")
     lines = done.stdout.splitlines()
-    assert re.match(r"glance, epoch 1 of 2: loss [\d.]+ for rendered patches, with ", lines[2])
+    assert re.match(r"glance, epoch 1 of 2: validation loss [\d.]+ for rendered patches, with ", lines[2])
     model = tmp_path / "run" / "model.onnx"
     assert lines[7:] == [
         f"{model}: not measured, because no frames are for validation",
