@@ -50,12 +50,15 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     assert re.fullmatch(r"training: \d+ patches, \d+ of them show the object ball", lines[1])
     assert re.fullmatch(r"validation: \d+ proposals, \d+ of them show the object ball", lines[2])
     assert re.fullmatch(r"the mesh network proposes \d+ of \d+ visible objects \(\d+ %\)", lines[3])
-    assert [each.split(":")[0] for each in lines[4:8]] == [f"epoch {number} of 4" for number in (1, 2, 3, 4)]
-    assert "look.pt: in " in lines[8]
+    assert lines[4].startswith("validation AP: ")
+    for number, line in enumerate(lines[5:9], start=1):
+        learned = r"validation AP [\d.]+, .*; loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left"
+        assert re.fullmatch(rf"epoch {number} of 4: {learned}", line), line
+    assert "look.pt: in " in lines[9]
     output = folder / "model.onnx"
     behind = f"--from {folder / 'mesh.onnx'} --glance {folder / 'look.pt'} -o {folder}-look"
-    assert lines[9] == f"next, to use it as a glance: vm-train look {drawn} {behind}"
-    assert lines[10] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
+    assert lines[10] == f"next, to use it as a glance: vm-train look {drawn} {behind}"
+    assert lines[11] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
     assert {path.name for path in folder.iterdir()} == {
         *("look.toml", "pictures.json", "run.json", "mesh.onnx", "patches", "state.pt", "log.jsonl", "tensorboard"),
         *("look.pt", "result.json"),
