@@ -29,7 +29,7 @@ def test_the_case(shared):
     folder = shared / "cases/boxes/mixed"
     if not folder.is_dir():
         pytest.skip("needs ../shared/cases")
-    done = run_program("vm-train", "check", folder, "--boxes", "--no-look", code=1)
+    done = run_program("vm-train", "check", folder, "--boxes", "--no-look", "--verbose", code=1)
     assert "1 pictures can be used" in done.stdout
     for name in ("1", "5"):
         assert re.search(rf"\b{name}\.txt line 1: .*\b{name}\.jpg not used", done.stderr)

@@ -41,7 +41,7 @@ def test_what_good_pictures_show_is_counted(folder):
     assert found.facts[0].unlabeled == 1600
     assert math.isclose(found.facts[0].height, LOOKING_DOWN.height)
     assert math.isclose(found.facts[0].pitch, 0.5)
-    assert complaints(found) == []
+    assert complaints(found, verbose=False) == []
 
 
 @pytest.mark.parametrize(("kind", "said", "damage"), FAULTS.values(), ids=FAULTS)
@@ -50,9 +50,8 @@ def test_each_fault_is_told_and_the_others_are_good(kind, said, damage, folder):
     found = checked(folder)
     assert [each.number for each in found.good] == ["0000002"]
     assert [(each.number, each.kind) for each in found.faults] == [("0000001", kind)]
-    first, second = complaints(found)
-    assert first.startswith("1 of 2 pictures ")
-    assert said in second
+    (line,) = complaints(found, verbose=False)
+    assert said in line
 
 
 def test_each_kind_of_fault_has_one_line_and_a_count(tmp_path):
