@@ -11,7 +11,7 @@ import torch
 from torch import nn
 
 from vm_embedded.arrays import Singles
-from vm_embedded.network.manifest import METADATA_KEY, Manifest
+from vm_embedded.network.manifest import METADATA_KEY, PEAK_OUTPUTS, Manifest
 
 from .canvas_network import CanvasNetwork, Separable
 from .canvas_shape import CanvasShape
@@ -76,7 +76,7 @@ def read_canvas(constants: Mapping[str, Singles]) -> CanvasNetwork:
     InputError for other models.
     """
     depth = sum(name.startswith("down0.") and name.endswith(".mix.kernel") for name in constants)
-    peaks = len(constants["peaks.kernel"]) // 4 if "peaks.kernel" in constants else 0
+    peaks = len(constants["peaks.kernel"]) // PEAK_OUTPUTS if "peaks.kernel" in constants else 0
     shape = CanvasShape(depth, len(constants["stem.kernel"]), len(constants["head.kernel"]), peaks)
     network = CanvasNetwork(shape)
 

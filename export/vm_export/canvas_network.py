@@ -15,6 +15,7 @@ import torch
 from torch import nn
 
 from vm_embedded.network.canvas_layout import place_on_canvas
+from vm_embedded.network.manifest import PEAK_OUTPUTS
 
 from .canvas_shape import CanvasShape
 
@@ -73,10 +74,10 @@ class CanvasNetwork(nn.Module):
         self.lift = nn.ModuleList(Mix(coarse, fine) for fine, coarse in steps)
         self.up = nn.ModuleList(Separable(fine, fine) for fine, _ in steps)
         self.head = Mix(widths[0], shape.classes)
-        self.peaks = Mix(widths[0], 4 * shape.peaks) if shape.peaks else None
+        self.peaks = Mix(widths[0], PEAK_OUTPUTS * shape.peaks) if shape.peaks else None
         if self.peaks is not None:
             assert self.peaks.bias is not None
-            self.peaks.bias.data[::4] = _RARE
+            self.peaks.bias.data[::PEAK_OUTPUTS] = _RARE
 
     @property
     def blocks(self) -> list[list[Separable]]:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from vm_embedded.errors import InputError
+from vm_embedded.network.manifest import PEAK_OUTPUTS
 
 COARSER = ((1.5, 1), (2.0, 2), (3.0, 2))
 """Of each coarser canvas: its channels, as a multiple of those of the finest one, and its separable convolutions."""
@@ -39,7 +40,7 @@ class CanvasShape:
     @property
     def outputs(self) -> int:
         """Channels of the output: probabilities of the classes, and four numbers for each class with peaks."""
-        return self.classes + 4 * self.peaks
+        return self.classes + PEAK_OUTPUTS * self.peaks
 
     @property
     def widths(self) -> tuple[int, ...]:

@@ -97,11 +97,12 @@ def peak_targets(cells: Indices, labels: Labels, objects: Singles, classes: Sequ
         if not shown:
             counts[beside, at] = False
             continue
+        # Below 1, which marks the cell that has the place in it.
         score[:, at] = np.maximum(score[:, at], 0.99 * np.exp(-square / (2.0 * _BELL**2)))
         own = np.abs(step).max(axis=1) <= 0.5
         score[own, at] = 1.0
         nearer = beside & (square < nearest[:, at]) & (labels >= 0)
         nearest[nearer, at] = square[nearer]
         way[nearer, at, :2], way[nearer, at, 2] = step[nearer], size
-        near |= nearer[:, None] & (np.arange(len(classes)) == at)
+        near[nearer, at] = True
     return PeakTargets(score, counts, way, near)

@@ -8,6 +8,8 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from vm_embedded.network.manifest import PEAK_OUTPUTS
+
 from ..graphs.labeled_graph import LabeledGraph
 from ..graphs.peak_targets import PeakTargets, peak_targets
 
@@ -34,7 +36,7 @@ def peak_losses(outputs: torch.Tensor, targets: PeakTargets) -> tuple[torch.Tens
     outputs (n, 4 P): of the network, as the manifest describes them.
     """
     score, counts, way, near = (torch.from_numpy(each).to(outputs.device) for each in targets)
-    found = outputs.float().reshape(len(outputs), -1, 4)
+    found = outputs.float().reshape(len(outputs), -1, PEAK_OUTPUTS)
     logits = found[..., 0]
     chance, own = logits.sigmoid(), (score == 1.0) & counts
     misses = (1.0 - chance) ** 2 * functional.logsigmoid(logits)
