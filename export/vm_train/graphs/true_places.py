@@ -44,7 +44,7 @@ def true_places(picture: Picture, scene: Path | None, manifest: Manifest) -> lis
     truth = None if scene is None else read_scene(scene)
     field = None if scene is None else read_field(scene)
     names = [each.name for each in manifest.classes]
-    uprights = true_uprights(picture, field, names)
+    uprights = true_uprights(picture, field, names) if KINDS.keys() & manifest.peaks else None
     view, found = GroundView.of(picture), []
     for name in manifest.peaks:
         number = names.index(name)

@@ -110,11 +110,16 @@ def field_truth(picture: Picture, scene: FieldScene | None, classes: Sequence[st
 def true_uprights(
     picture: Picture, scene: FieldScene | None, classes: Sequence[str]
 ) -> dict[str, Sequence[TrueUpright]] | None:
-    """What stands on the plane, by kind; None if no scene file tells. classes: as `field_truth` takes them."""
+    """What stands on the plane, by kind; None if no scene file tells.
+
+    classes: names in the order of the labels. A class that is missing there hides no foot and shows no post.
+    """
     if scene is None or scene.standing is None:
         return None
     view = GroundView.of(picture)
-    by_name = {name: picture.labels == number for number, name in enumerate(classes) if name in CLASSES}
+    nowhere = np.zeros(picture.labels.shape, dtype=np.bool_)
+    by_name = dict.fromkeys(CLASSES, nowhere)
+    by_name |= {name: picture.labels == number for number, name in enumerate(classes) if name in CLASSES}
     return {kind: _uprights(view, by_name, scene.standing, kind) for kind in KINDS}
 
 

@@ -126,6 +126,15 @@ def test_a_scene_tells_the_places_and_a_mask_those_of_balls_only(tmp_path):
         true_places(shown, scene, MANIFEST)
 
 
+@pytest.mark.parametrize(("known", "shown"), [("ball", []), ("goal:upright", [1, 1, 0]), ("robot:upright", [1, 0])])
+def test_a_network_of_few_classes_learns_the_places_of_these(tmp_path, known, shown):
+    manifest = ball_manifest(known, "rest", mesh="octaves", layout="canvas", peaks=(known.partition(":")[0],))
+    labels = np.array([each not in known for each in CLASSES], np.int8)[picture().labels]
+    scene = write_scene(tmp_path / "scene1.json", scene_table() | {"ball_radius": 0.1, "ball": None})
+    found = true_places(replace(picture(), labels=labels), scene, manifest)
+    assert [(each.number, each.shown) for each in found] == [(0, bool(each)) for each in shown]
+
+
 def test_a_camera_error_moves_the_cell_and_not_the_pixel(tmp_path):
     shown, pixel = picture(), tuple(pixels_of(np.array([[2.5, 1.6, 0.0]]))[0])
     place = [TruePlace(ROBOT, pixel, 0.4, True)]
