@@ -50,7 +50,7 @@ def test_a_model_is_taken_back_before_a_release(prefix):
     for model in ("ball", "ball-small"):
         back = prefix.deploy("rollback")
         assert (back.returncode, prefix.model, prefix.link("current")) == (0, model, "2-second"), back.stderr
-    assert prefix.deploy("rollback", "release").returncode == 2
+    assert prefix.deploy("rollback", "2-second").returncode == 2
     for release, model in (("1-first", "ball"), ("2-second", "ball-small")):  # the second one undoes the first
         back = prefix.deploy("rollback", *(["release"] if release == "1-first" else []))
         assert (back.returncode, prefix.model, prefix.link("current")) == (0, model, release), back.stderr
