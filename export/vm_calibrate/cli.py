@@ -119,8 +119,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _load() -> Commands:
+    from vm_embedded.cameras.library_messages import silence_opencv
+
     from .commands import COMMANDS
 
+    silence_opencv()
     return COMMANDS
 
 
