@@ -1,7 +1,7 @@
 """The file of answers: a line of JSON for each answer, on disk before the page shows it as saved.
 
-A box that a person drew is an answer, too: a line with `"drawn": true`. The last line for a crop counts. A line that was
-cut short, for example by a power failure, is ignored.
+A box that a person drew is an answer, too: a line with `"drawn": true`. The last line for a crop counts. A line that
+was cut short, for example by a power failure, is ignored.
 """
 
 from __future__ import annotations

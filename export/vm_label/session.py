@@ -105,8 +105,8 @@ class Session:
     def answer(self, crop: Crop, answer: str | None) -> list[str]:
         """Write an answer to the disk, or None to take it back, which removes a drawn box.
 
-        Returns the ids of the replaced crops of the image. Raises ValueError for a yes to a whole picture, and InputError
-        if the answer can't be written.
+        Returns the ids of the replaced crops of the image. Raises ValueError for a yes to a whole picture, and
+        InputError if the answer can't be written.
         """
         if answer == "yes" and crop.id in self._pictures:
             raise ValueError("a whole picture is no object")
@@ -127,7 +127,7 @@ class Session:
         return whole(image) if crop.id in self._pictures else cut(image, crop.shares)
 
     def box_at(self, picture: Crop, point: tuple[float, float]) -> Shares:
-        """The box of an object whose center is at a point of a picture (see `sizing.box_at`). Raises VisualMeshError."""
+        """The box of an object whose center is at a point of a picture, as from `sizing.box_at`."""
         path = self._folder.path / picture.image
         height, width = read_image(path).shape[:2]
         return box_at(path, (width, height), point)

@@ -38,8 +38,10 @@ class Written:
 def write_training_boxes(folder: BoxFolder, answers: Mapping[str, str], target: Path, empty: bool = False) -> Written:
     """Write images, NAME.txt, classes.txt and lens files to a new folder, which keeps the folders of the images.
 
-    answers: by crop, oldest first. empty: also write images without a crop and without an answer, as background. Raises InputError if the target has files
-    or lies in the folder of boxes, or if it can't be written; then it is as before.
+    answers: by crop, oldest first. empty: also write images without a crop and without an answer, as background.
+
+    Raises InputError if the target has files or lies in the folder of boxes, or if it can't be written; then it is as
+    before.
     """
     _check_target(folder.path, target)
     by_image: dict[str, list[Crop]] = defaultdict(list)
