@@ -85,21 +85,20 @@ class Session:
         """The crop of a box that a person drew in a picture. Raises InputError for an unusable one."""
         if not _ID.fullmatch(id) or id in self._pictures:
             raise InputError("a drawn box needs an id of its own, of sixteen hexadecimal digits")
-        if picture not in self._pictures:
+        if not isinstance(picture, str) or picture not in self._pictures:
             raise InputError("a drawn box needs the id of its picture")
         if class_name not in self._folder.classes:
             raise InputError(unknown("class", class_name, self._folder.classes))
-        crop = Crop(self._pictures[str(picture)].image, str(class_name), checked_shares(box), None, id)
+        crop = Crop(self._pictures[picture].image, str(class_name), checked_shares(box), None, id)
         if id in self._crops:
             if self._crops[id] != crop:
                 raise InputError("this id belongs to another box")
             return crop
         height, width = read_image(self._folder.path / crop.image).shape[:2]
-        sides = crop.shares[2] * width, crop.shares[3] * height
+        sides = [share * length for share, length in zip(crop.shares[2:], (width, height), strict=True)]
         if min(sides) < LEAST_SIDE:
-            raise InputError(
-                f"the box has {sides[0]:.1f} x {sides[1]:.1f} px; each side must be {LEAST_SIDE:g} px long"
-            )
+            shown = " x ".join(f"{side:.1f}" for side in sides)
+            raise InputError(f"a box of {shown} px is too small; draw at least {LEAST_SIDE:g} px")
         return crop
 
     def answer(self, crop: Crop, answer: str | None) -> list[str]:

@@ -37,7 +37,7 @@ def box_at(image: Path, size: Size, point: tuple[float, float]) -> Shares:
     if not (np.isfinite(ray).all() and ray[0, 2] < 0.0):
         raise InputError("no object lies on the plane there: it is above the horizon, or outside of the lens")
     rays = to_camera(shape.outline(shape.center_along(ray, pose.height)[0], pose.height), pose.rotation)
-    box = bounding_box(lens.project(rays, size), size) if lens.sees(rays).all() else None
+    box = bounding_box(lens.project(rays[lens.sees(rays)], size), size)
     if box is None:
-        raise InputError("an object there is too small to see, or at the border of the lens")
+        raise InputError("an object there is too small to see")
     return box
