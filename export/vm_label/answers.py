@@ -102,7 +102,13 @@ class AnswerFile:
 
         After an error, the file is as before.
         """
-        fields = {"crop": crop.id, "answer": answer, "image": crop.image, "class": crop.class_name, "box": crop.shares}
+        fields: dict[str, Any] = {
+            "crop": crop.id,
+            "answer": answer,
+            "image": crop.image,
+            "class": crop.class_name,
+            "box": crop.shares,
+        }
         if crop.drawn:
             fields["drawn"] = True
         now = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())

@@ -83,7 +83,7 @@ def replaced(crops: Iterable[Crop], answers: Mapping[str, str]) -> frozenset[str
     by_image: dict[str, list[Crop]] = defaultdict(list)
     for crop in crops:
         by_image[crop.image].append(crop)
-    newest_first = {crop: place for place, crop in enumerate(reversed(answers))}
+    newest_first = {crop: place for place, crop in enumerate(reversed([*answers]))}
     kept: set[str] = set()
     gone: set[str] = set()
     accepted = (crop for each in by_image.values() for crop in each if crop.drawn and answers.get(crop.id) == "yes")
