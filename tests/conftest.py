@@ -24,6 +24,12 @@ def pytest_configure(config):
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 
+@pytest.fixture(scope="session", autouse=True)
+def state_folder(tmp_path_factory):
+    """Programs keep their state here, and not in the home of the person who tests."""
+    os.environ["XDG_STATE_HOME"] = str(tmp_path_factory.mktemp("state"))
+
+
 @pytest.fixture(scope="session")
 def shared():
     """The folder of the reference data: $VM_SHARED, or `shared` beside the checkout."""

@@ -69,8 +69,9 @@ def test_vm_label_shows_the_same_crops_of_all_of_them(boxes):
         shares = folder.crops[0].shares
         crops = [each.id for each in folder.crops if each.shares == shares]
         assert len(crops) == len(FORMATS)
-        for entire in (False, True):
-            assert len({session.picture(each, entire) for each in crops}) == 1
+        wholes = [each["id"] for each in session.state()["pictures"]]
+        for ids in (crops, wholes):
+            assert len({session.picture(session.find(each)) for each in ids}) == 1
 
 
 def test_vm_train_reads_the_same_boxes_and_lens_of_all_of_them_and_makes_the_same_masks(boxes, tmp_path):

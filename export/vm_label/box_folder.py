@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from vm_embedded.cameras.frame_source import IMAGE_SUFFIXES
@@ -64,6 +64,27 @@ def read_box_folder(path: Path, only: Sequence[str] = ()) -> BoxFolder:
         tuple(crops),
         frozenset(reader.faulty),
         tuple(reader.problems),
+    )
+
+
+def with_drawn(folder: BoxFolder, drawn: Iterable[Crop], only: Sequence[str] = ()) -> BoxFolder:
+    """The folder with the boxes that a person drew. only: as in `read_box_folder`.
+
+    A box of an image that is not there any more is a problem.
+    """
+    chosen = [crop for crop in drawn if not only or crop.class_name in only]
+    images = set(folder.images)
+    there = [crop for crop in chosen if crop.image in images]
+    gone = [
+        f"{folder.path / crop.image}: a {crop.class_name} was drawn in this image, but there is no such image"
+        for crop in chosen
+        if crop.image not in images
+    ]
+    return replace(
+        folder,
+        classes=tuple(dict.fromkeys([*folder.classes, *(crop.class_name for crop in there)])),
+        crops=(*folder.crops, *there),
+        problems=(*folder.problems, *gone),
     )
 
 

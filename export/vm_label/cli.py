@@ -14,10 +14,11 @@ from pathlib import Path
 
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
 from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.output.box_files import CLASSES
 from vm_workstation.stopping import stoppable
 
 from .answers import AnswerFile, read_answers
-from .box_folder import BoxFolder, read_box_folder
+from .box_folder import BoxFolder, read_box_folder, with_drawn
 from .server import LabelServer
 from .session import Session
 from .training_boxes import Written, write_training_boxes
@@ -27,8 +28,9 @@ def parser() -> argparse.ArgumentParser:
     """The command line of vm-label."""
     parser = Parser(
         prog="vm-label",
-        description="Judge boxes on a page in the browser: is this the object? yes, no or skip. Each answer is saved "
-        "at once in DIR/answers.jsonl. Ctrl-C ends the program; the next start continues.",
+        description="Judge boxes on a page in the browser: is this the object? yes, no or skip. Draw the boxes of "
+        "missed objects there. Each answer is saved at once in DIR/answers.jsonl. Ctrl-C ends the program; the next "
+        "start continues.",
         epilog="Exit status: 0 done, or the page was ended by Ctrl-C; 1 not done (standard error says why); 2 wrong "
         "usage; 130 interrupted while writing.",
     )
@@ -68,7 +70,9 @@ def parser() -> argparse.ArgumentParser:
         "with a skipped or unanswered crop is left out, because a training takes places without a box as background",
     )
     write.add_argument(
-        "--empty", action="store_true", help="with --write: also write images without any crop, as background"
+        "--empty",
+        action="store_true",
+        help="with --write: also write images without any crop and without an answer, as background",
     )
     return parser
 
@@ -99,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if options.write is None:
                 _serve(options, folder)
             else:
-                answers = _answers(folder)
+                folder, answers = _judged(folder, options)
                 print(_report(options.write, write_training_boxes(folder, answers, options.write, options.empty)))
             return EXIT_OK
     except VisualMeshError as error:
@@ -114,25 +118,32 @@ def _complain(problems: Sequence[str]) -> None:
         print(f"vm-label: {problem}", file=sys.stderr)
 
 
-def _answers(folder: BoxFolder) -> dict[str, str]:
-    """The answers so far. It reports lines that it can't read."""
-    answers, faults = read_answers(folder.path)
-    _complain(faults)
-    return answers
+def _judged(folder: BoxFolder, options: argparse.Namespace) -> tuple[BoxFolder, dict[str, str]]:
+    """The folder with the drawn boxes, and the answers so far. It reports lines that it can't use."""
+    answers, drawn, faults = read_answers(folder.path)
+    judged = with_drawn(folder, drawn, options.classes)
+    _complain([*faults, *judged.problems[len(folder.problems) :]])
+    return judged, answers
 
 
 def _serve(options: argparse.Namespace, folder: BoxFolder) -> None:
     """Serve the page until Ctrl-C. Raises InputError."""
-    if not folder.crops:
+    if not folder.classes:
         raise InputError(
-            f"no boxes to judge in {folder.path}: vm-detect --save-boxes makes some; boxes of another tool must be in "
-            "YOLO format (NAME.txt)"
+            f"no boxes to judge in {folder.path}, and no classes to draw: vm-detect --save-boxes makes boxes; those of "
+            "another tool must be in YOLO format (NAME.txt). To draw all of them, write the names of the classes to "
+            f"{folder.path / CLASSES}, one in a line"
         )
     with AnswerFile(folder.path) as file:
-        session = Session(folder, _answers(folder), file)
+        folder, answers = _judged(folder, options)
+        session = Session(folder, answers, file)
         with LabelServer(session, options.host, options.port) as server:
-            images = len({crop.image for crop in folder.crops})
-            print(f"{len(session)} crops of {images} images, {session.answered} answered: {server.url}", flush=True)
+            without = len(folder.images) - len({crop.image for crop in folder.crops})
+            print(
+                f"{len(session)} crops of {len(folder.images)} images, {without} of them without a crop; "
+                f"{session.answered} crops answered: {server.url}",
+                flush=True,
+            )
             if not options.no_browser and ("DISPLAY" in os.environ or "WAYLAND_DISPLAY" in os.environ):
                 threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
             with suppress(KeyboardInterrupt):
@@ -146,7 +157,7 @@ def _report(target: Path, written: Written) -> str:
     left = [
         (written.open, "with unanswered crops"),
         (written.skipped, "with skipped crops"),
-        (written.empty, "without any crop (--empty writes them)"),
+        (written.empty, "without any crop or answer (--empty writes them)"),
         (written.faulty, "with boxes that can't be read"),
     ]
     lines = [f"{target}: {written.images} images, {written.background} of them background; boxes: {boxes}"]

@@ -1,4 +1,4 @@
-"""Pictures of a crop: cut out of its image with a margin, or the whole image, with the box drawn in."""
+"""Pictures for the page: a crop, cut out of its image with a margin and its box, or a whole image."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _MARGIN = 2.0
 _LEAST_SPAN = 48.0
 """Least width of what a crop shows [px of the image]."""
 
-_WIDEST = 1600
-"""Largest side of the picture of a whole image [px]."""
+_WIDEST = 2400
+"""Largest side of the picture of a whole image [px]. The page can enlarge it, to draw small boxes."""
 
 _OUTSIDE = (128, 128, 128)
 _LINE, _EDGE = (60, 220, 255), (30, 30, 30)
@@ -45,13 +45,11 @@ def cut(image: Image, shares: Shares) -> bytes:
     return _jpeg(picture)
 
 
-def whole(image: Image, shares: Shares) -> bytes:
-    """A JPEG of a whole image, BGR uint8 (height, width, 3), with the box; large images are made smaller."""
+def whole(image: Image) -> bytes:
+    """A JPEG of a whole image, BGR uint8 (height, width, 3); large images are made smaller."""
     scale = min(_WIDEST / max(image.shape[:2]), 1.0)
-    size = [round(scale * each) for each in image.shape[1::-1]]
-    picture = _resized(image, size) if scale < 1.0 else image.copy()
-    _draw_box(picture, np.array(shares[:2]) * size - 0.5, np.array(shares[2:]) * size + 10.0)
-    return _jpeg(picture)
+    size = [max(round(scale * each), 1) for each in image.shape[1::-1]]
+    return _jpeg(_resized(image, size) if scale < 1.0 else image)
 
 
 def _resized(image: Image, size: list[int]) -> Image:

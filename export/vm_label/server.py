@@ -1,8 +1,11 @@
 """The web server of the labeling page. It needs no internet, and by default only this machine can reach it.
 
-GET / is the page, /state the session as JSON, /alive a short sign of life, /crop/ID and /picture/ID are JPEGs of a crop
-and of its entire image. POST /answer takes {"session": ID, "crop": ID, "answer": "yes", "no", "skip" or null}; its
-response comes after the answer is on disk.
+GET / is the page, /state the session as JSON, /alive a short sign of life, and /picture/ID a JPEG of a crop, or of a
+whole image. /box/ID/X/Y is the box of an object whose center is at X, Y of a whole image, as shares of its size.
+
+POST /answer takes {"session": ID, "crop": ID, "answer": "yes", "no", "skip" or null}, where ID may also be that of a
+whole image. A box that a person drew has an ID that the page chose, and "drawn": {"picture": ID, "class": NAME, "box":
+[x, y, width, height]}. The response comes after the answer is on disk.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from socketserver import TCPServer
 from typing import Any
 
 from vm_embedded.borders.text import to_json
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.live.http_server import is_numeric_host
 
 from .answers import ANSWERS
@@ -63,7 +66,8 @@ class _Handler(BaseHTTPRequestHandler):
     server: LabelServer
 
     def do_GET(self) -> None:
-        session, (kind, _, crop) = self.server.session, self.path.partition("?")[0].strip("/").partition("/")
+        session, (kind, *rest) = self.server.session, self.path.partition("?")[0].strip("/").split("/")
+        crop = session.find(rest[0]) if rest else None
         if not is_numeric_host(self.headers.get("Host", "127.0.0.1")):
             self._refuse(HTTPStatus.FORBIDDEN, "use the IP address, not a host name")
         elif self.path == "/":
@@ -71,14 +75,20 @@ class _Handler(BaseHTTPRequestHandler):
         elif self.path == "/state":
             self._send_json(session.state())
         elif self.path == "/alive":
-            self._send_json({"session": session.id})
-        elif kind in ("crop", "picture") and session.knows(crop):
+            self._send_json({"session": session.id, "saved": session.saved})
+        elif crop is not None and kind == "picture" and len(rest) == 1:
             try:
-                picture = session.picture(crop, entire=kind == "picture")
+                picture = session.picture(crop)
             except InputError as error:
                 self._refuse(HTTPStatus.INTERNAL_SERVER_ERROR, str(error))
             else:
                 self._send(HTTPStatus.OK, "image/jpeg", picture)
+        elif crop is not None and kind == "box" and len(rest) == 3:
+            try:
+                x, y = map(float, rest[1:])
+                self._send_json({"box": session.box_at(crop, (x, y))})
+            except (ValueError, VisualMeshError) as error:
+                self._refuse(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
         else:
             self._refuse(HTTPStatus.NOT_FOUND, "page not found")
 
@@ -100,21 +110,31 @@ class _Handler(BaseHTTPRequestHandler):
         session = self.server.session
         try:
             fields = json.loads(body)
-            ours, crop, answer = fields["session"] == session.id, fields["crop"], fields["answer"]
-            good = isinstance(crop, str) and (answer is None or answer in ANSWERS)
+            ours, id, answer = fields["session"] == session.id, fields["crop"], fields["answer"]
+            drawn = fields.get("drawn")
+            good = isinstance(id, str) and (answer is None or answer in ANSWERS) and isinstance(drawn, dict | None)
         except (ValueError, KeyError, TypeError, RecursionError):
             good = False
         if not good:
             self._refuse(HTTPStatus.BAD_REQUEST, "an answer has a session, a crop and an answer")
-        elif not ours or not session.knows(crop):
+            return
+        try:
+            crop = session.drawn(id, *map(drawn.get, ("picture", "class", "box"))) if ours and drawn else None
+        except InputError as error:
+            self._refuse(HTTPStatus.UNPROCESSABLE_ENTITY, str(error))
+            return
+        crop = crop or session.find(id)
+        if not ours or crop is None:
             self._refuse(HTTPStatus.CONFLICT, "this crop is not of the folder that vm-label shows now")
+            return
+        try:
+            replaced = session.answer(crop, answer)
+        except InputError as error:
+            self._refuse(HTTPStatus.INSUFFICIENT_STORAGE, str(error))
+        except ValueError as error:
+            self._refuse(HTTPStatus.BAD_REQUEST, str(error))
         else:
-            try:
-                session.answer(crop, answer)
-            except InputError as error:
-                self._refuse(HTTPStatus.INSUFFICIENT_STORAGE, str(error))
-            else:
-                self._send_json({"crop": crop, "answer": answer})
+            self._send_json({"crop": id, "answer": answer, "replaced": replaced, "saved": session.saved})
 
     def _send_json(self, content: Any) -> None:
         self._send(HTTPStatus.OK, "application/json", to_json(content, allow_nan=False).encode())
@@ -126,7 +146,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(status)
         self.send_header("Content-Type", media_type)
         self.send_header("Content-Length", str(len(content)))
-        # A crop never changes; its address holds a digest of image, class and box.
+        # A crop never changes: another box has another address.
         keep = status == HTTPStatus.OK and media_type == "image/jpeg"
         self.send_header("Cache-Control", "private, max-age=3600" if keep else "no-store")
         self.end_headers()

@@ -1,7 +1,7 @@
 """Writing judged boxes as training data: a folder of images with boxes in YOLO format.
 
 A training takes every place without a box as background. So it gets only images of which all crops were answered with
-yes or no.
+yes or no, or replaced by a drawn box, and images without a crop of which a person said that they show no object.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from vm_embedded.files import atomic_folder, read_bytes, real_path
 from vm_embedded.output.box_files import CLASSES, yolo_line
 
 from .box_folder import BoxFolder
-from .crops import Crop
+from .crops import Crop, replaced, whole_picture
 
 
 @dataclass(frozen=True)
 class Written:
     """What was written and left out, in images. boxes: number of accepted boxes by class. background: written images
     without a box. open, skipped: left out because of crops without an answer, and of skipped ones. empty: left out
-    because they have no crop. faulty: left out because not all of their boxes can be read."""
+    because they have no crop and nobody answered. faulty: left out because not all of their boxes can be read."""
 
     images: int
     boxes: Mapping[str, int]
@@ -38,13 +38,17 @@ class Written:
 def write_training_boxes(folder: BoxFolder, answers: Mapping[str, str], target: Path, empty: bool = False) -> Written:
     """Write images, NAME.txt, classes.txt and lens files to a new folder, which keeps the folders of the images.
 
-    answers: by crop. empty: also write images without a crop, as background. Raises InputError if the target has files
-    or lies in the folder of boxes, or if it can't be written; then it is as before.
+    answers: by crop, oldest first. empty: also write images without a crop and without an answer, as background.
+
+    Raises InputError if the target has files or lies in the folder of boxes, or if it can't be written; then it is as
+    before.
     """
     _check_target(folder.path, target)
     by_image: dict[str, list[Crop]] = defaultdict(list)
+    gone = replaced(folder.crops, answers)
     for crop in folder.crops:
-        by_image[crop.image].append(crop)
+        if crop.id not in gone:
+            by_image[crop.image].append(crop)
     fates = {image: _fate(folder, by_image[image], image, answers) for image in folder.images}
     chosen = [image for image, fate in fates.items() if fate == "written" or (empty and fate == "empty")]
     if not chosen:
@@ -67,7 +71,10 @@ def write_training_boxes(folder: BoxFolder, answers: Mapping[str, str], target: 
 
 def _fate(folder: BoxFolder, crops: list[Crop], image: str, answers: Mapping[str, str]) -> str:
     """Whether an image is written, or why it is left out."""
+    about_all = answers.get(whole_picture(image, folder.classes).id)
     given = [answers.get(crop.id) for crop in crops]
+    if not crops and about_all in ("no", "skip"):
+        given = [about_all]
     if image in folder.faulty:
         return "faulty"
     if not given:

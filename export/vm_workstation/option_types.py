@@ -24,5 +24,5 @@ def add_set(made: argparse._ActionsContainer, example: str) -> None:
         action="append",
         default=[],
         metavar="SECTION.ENTRY=VALUE",
-        help=f"override an entry of the configuration, for example {example}; repeat it for each entry",
+        help=f"override an entry: {example}; repeatable",
     )

@@ -33,11 +33,11 @@ def test_the_last_answer_counts_and_a_torn_line_costs_only_itself(before, after,
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write(folder, before)
-        assert read_answers(folder) == (last(before), [])
+        assert read_answers(folder) == (last(before), [], [])
         with (folder / "answers.jsonl").open("ab") as file:
             file.write(b'{"crop": "0123456789abcdef", "answer": "yes", "image": "image0.jpg"'[:torn])
         write(folder, after)
-        answers, faults = read_answers(folder)
+        answers, _, faults = read_answers(folder)
         assert answers == last([*before, *after])
         assert len(faults) == (torn > 0)
 
@@ -58,7 +58,7 @@ def test_a_line_that_is_not_an_answer_is_named(tmp_path, line):
     write(tmp_path, [(CROPS[0], "yes")])
     with (tmp_path / "answers.jsonl").open("a") as file:
         file.write(line + "\n\n")
-    answers, (fault,) = read_answers(tmp_path)
+    answers, _, (fault,) = read_answers(tmp_path)
     assert answers == {CROPS[0].id: "yes"}
     assert "answers.jsonl: line 2 is not an answer" in fault
 
@@ -78,7 +78,7 @@ def test_a_full_disk_leaves_the_file_as_it_was(tmp_path):
             signal.signal(signal.SIGXFSZ, handler)
         assert file.path.stat().st_size == size
         file.append(CROPS[1], "skip")
-    assert read_answers(tmp_path) == ({CROPS[0].id: "yes", CROPS[1].id: "skip"}, [])
+    assert read_answers(tmp_path) == ({CROPS[0].id: "yes", CROPS[1].id: "skip"}, [], [])
 
 
 def test_only_one_process_has_the_file_open(tmp_path):

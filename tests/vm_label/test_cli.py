@@ -49,7 +49,7 @@ def test_only_fully_judged_images_become_training_data(tmp_path):
         f"{tmp_path / 'out'}: 3 images, 1 of them background; boxes: 2 ball",
         "left out: 1 image with unanswered crops",
         "left out: 1 image with skipped crops",
-        "left out: 1 image without any crop (--empty writes them)",
+        "left out: 1 image without any crop or answer (--empty writes them)",
         f"next: vm-train look --from ball --boxes {tmp_path / 'out'} -o tuned",
     ]
     out = tmp_path / "out"
@@ -179,8 +179,11 @@ def test_a_folder_without_boxes_is_named(tmp_path):
     assert "no images in" in run(tmp_path, code=1).stderr
     make_folder(tmp_path, 1, near=False)
     (tmp_path / "candidates.jsonl").unlink()
-    (tmp_path / "image0000.txt").write_text("")
-    assert "vm-detect --save-boxes makes some" in run(tmp_path, code=1).stderr
+    (tmp_path / "image0000.txt").unlink()
+    (tmp_path / "classes.txt").unlink()
+    complaint = run(tmp_path, code=1).stderr
+    assert "vm-detect --save-boxes makes boxes" in complaint
+    assert str(tmp_path / "classes.txt") in complaint
 
 
 def test_a_stopped_server_says_how_far_it_came(tmp_path):
@@ -215,8 +218,8 @@ def test_the_server_refuses_what_its_page_does_not_send(tmp_path):
         assert post(address, "x" * 10_000)[0] == 400
         assert post(address, json.dumps(good | {"crop": "0"}))[0] == 409
         assert post(address, json.dumps(good | {"session": "0"}))[0] == 409
-        assert request(address, "GET", "/crop/../../classes.txt")[0] == 404
-        status, reason = request(address, "GET", f"/crop/{good['crop']}")
+        assert request(address, "GET", "/picture/../../classes.txt")[0] == 404
+        status, reason = request(address, "GET", f"/picture/{good['crop']}")
         assert status == 500
         assert b"image0000.jpg" in reason
         assert not answer_lines(folder)

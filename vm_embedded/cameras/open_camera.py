@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable
 from dataclasses import replace
 from difflib import get_close_matches
@@ -84,10 +85,10 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         if raw and device_path(source) is None and not source.startswith("gstreamer:"):
             raise InputError(f"camera {without_password(source)} delivers colors: it supports only --format bgr")
         return lambda: OpenCvCamera(settings, raw)
-    if not exists(there(Path(source))):
+    if not exists(there(Path(source))) and not glob.glob(source, recursive=True):  # noqa: PTH207 (as in image_files.py)
         raise InputError(
             f"no such camera: {without_password(source)!r}; give a device, an address, an existing file or folder, "
-            "synthetic, fault:SCRIPT or gstreamer:PIPELINE"
+            "a pattern of images, synthetic, fault:SCRIPT or gstreamer:PIPELINE"
         )
     return lambda: FileCamera(settings, raw)
 

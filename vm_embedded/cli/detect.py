@@ -170,7 +170,12 @@ def _run(options: argparse.Namespace) -> int:
         return EXIT_OK
     if not given.camera.source:
         parser().error("no camera: give a file or --camera, or [camera] source in vm.toml")
-    if len(options.files) > 1 and (options.live or any(map(is_live, options.files))):
+    if len(options.files) > 1 and options.live and not any(map(is_live, options.files)):
+        raise InputError(
+            f"--live plays one video, folder or pattern, not {len(options.files)} files; put a pattern in quotes, so "
+            "that the shell does not replace it: --camera 'frames/*.jpg' --live"
+        )
+    if len(options.files) > 1 and any(map(is_live, options.files)):
         raise InputError(
             f"only one live camera at a time is possible, not {', '.join(map(without_password, options.files))}"
         )

@@ -63,8 +63,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
         if options.save_video is not None:
             video = stack.enter_context(VideoFile(options.save_video, source.rate or _IMAGES_RATE, source.files))
         if options.save_boxes is not None:
-            classes = tuple(each.name for each in detector.manifest.classes if each.kind == "object")
-            boxes = BoxWriter(options.save_boxes, classes)
+            boxes = BoxWriter(options.save_boxes, detector.manifest)
         work = _Pass(detector, pose, tracker, options, emit_points, boxes, mcap, video, ClosingRemarks(detector))
         _process_all(source, work)
     for remark in filter(None, (*source.remarks(), work.replaced, *work.remarks.lines())):

@@ -59,7 +59,7 @@ class Parser(argparse.ArgumentParser):
                 "--completion",
                 action=PrintCompletion,
                 nargs=0,
-                help='show the script that completes options in bash, for ~/.bashrc: eval "$(vm-detect --completion)"',
+                help='bash completion: eval "$(vm-detect --completion)"',
             )
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:

@@ -17,8 +17,12 @@ from .prepared_view import PreparedView
 
 # Colors are BGR. Objects stand out; classes that cover areas are pale.
 _OBJECT, _REJECTED = (60, 220, 255), (90, 90, 255)
+_HORIZON = (190, 190, 240)
 _UPRIGHT, _OTHER = (255, 120, 60), (140, 140, 140)
 _AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
+
+_HORIZON_STEPS = 720
+"""Corners of the horizon all around."""
 
 _AHEAD = 0.5
 """Arrows of tracks lead to where the objects will be after this time [s]."""
@@ -58,6 +62,18 @@ def draw_overlay(
     if field is not None:
         label_field(labels, field, observation.view)
     return canvas
+
+
+def draw_horizon(canvas: Image, view: PreparedView) -> None:
+    """Draw the horizon of the observation plane into a BGR image: where it should be if lens and pose are right."""
+    azimuths = np.linspace(-np.pi, np.pi, _HORIZON_STEPS + 1)
+    pixels = view.ray_pixels(np.column_stack([np.cos(azimuths), np.sin(azimuths), np.zeros_like(azimuths)]))
+    seen = np.asarray((np.abs(pixels) < FARTHEST).all(axis=1))  # false for NaN
+    for run in np.split(np.arange(len(pixels)), np.flatnonzero(np.diff(seen)) + 1):
+        if seen[run[0]]:
+            points = np.rint(pixels[run] * 16).astype(np.int32).reshape(-1, 1, 2)
+            cv2.polylines(canvas, [points], False, INK, 3, cv2.LINE_AA, shift=4)
+            cv2.polylines(canvas, [points], False, _HORIZON, 1, cv2.LINE_AA, shift=4)
 
 
 def _draw_points(canvas: Image, observation: Observation, threshold: float) -> None:

@@ -1,5 +1,5 @@
-"""The views of the latest frame for the status page: a video stream of pictures with the detections drawn into them,
-an overhead map, and the preview of another threshold."""
+"""The views of the latest frame for the status page: a picture with the detections drawn into it, an overhead map of
+the same frame, and the preview of another threshold."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from contextlib import suppress
 import cv2
 
 from ..detection.detections import Detections
+from ..detection.overlay import draw_horizon
 from .http_server import Query, Response, Write
 from .overhead_map import overhead_map
 
@@ -18,7 +19,7 @@ _BOUNDARY = b"--picture"
 _QUALITY = 80
 
 _REPEAT = 2.0
-"""Time after which the last image is sent again, if there is no new one [s]."""
+"""Longest wait for a new frame [s]; then the stream sends the last image again."""
 
 
 class FrameViews:
@@ -29,6 +30,7 @@ class FrameViews:
 
     def __init__(self, fps: float) -> None:
         self.latest: Detections | None = None
+        self._number = 0  # of the latest frame
         self._period = 1.0 / fps
         self._shown: tuple[Detections | None, bytes | None] = None, None
         self._mapped: tuple[Detections | None, bytes] = None, b"null"
@@ -39,24 +41,35 @@ class FrameViews:
     def show(self, detections: Detections) -> None:
         """Set the detections to show, with their frame."""
         self.latest = detections
+        self._number += 1
         self._changed.set()
 
     async def map(self, _: Query) -> Response:
         """The overhead map as JSON, see overhead_map.py; null before the first frame."""
-        async with self._mapping:
-            latest = self.latest
-            if latest is not None and latest is not self._mapped[0]:
-                self._mapped = latest, await asyncio.to_thread(_map_json, latest)
-            return Response("application/json", self._mapped[1])
+        return Response("application/json", await self._map(self.latest))
+
+    async def view(self, query: Query) -> Response:
+        """Number, picture (base64) and map of the latest frame as JSON; null if it is still the frame `after`."""
+        await asyncio.sleep(self._period)
+        if query.get("after", "0") == str(self._number):
+            await self._wait_for_change()
+        latest, number = self.latest, self._number
+        if latest is None or query.get("after") == str(number):
+            return Response("application/json", b"null")
+        picture = base64.b64encode(await self._picture(latest) or b"")
+        content = b'{"number": %d, "picture": "%b", "map": %b}' % (number, picture, await self._map(latest))
+        return Response("application/json", content)
 
     async def preview(self, detections: Detections) -> Response:
-        """A frame with other detections, as JSON: accepted, rejected (numbers), and the picture (base64)."""
+        """A frame with other detections, as JSON: accepted, rejected (numbers), picture (base64) and map."""
         async with self._drawing:
             picture = await asyncio.to_thread(_jpeg, detections)
+            plan = await asyncio.to_thread(overhead_map, detections)
         content = {
             "accepted": len(detections),
             "rejected": len(detections.rejected),
             "picture": base64.b64encode(picture).decode(),
+            "map": plan,
         }
         return Response("application/json", json.dumps(content).encode())
 
@@ -68,28 +81,40 @@ class FrameViews:
         )
         while True:
             sent = self.latest
-            picture = await self._picture()
+            picture = await self._picture(sent)
             if picture is not None:
                 head = b"\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(picture)
                 await write(_BOUNDARY + head + picture + b"\r\n")
             await asyncio.sleep(self._period)
             if self.latest is sent:
-                self._changed.clear()
                 # After that time, send the same image: only a write notices a closed connection.
-                with suppress(asyncio.TimeoutError):
-                    await asyncio.wait_for(self._changed.wait(), _REPEAT)
+                await self._wait_for_change()
 
-    async def _picture(self) -> bytes | None:
-        """The latest image as a JPEG; None before the first frame."""
+    async def _wait_for_change(self) -> None:
+        """Wait for a new frame, but not for long."""
+        self._changed.clear()
+        with suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._changed.wait(), _REPEAT)
+
+    async def _picture(self, detections: Detections | None) -> bytes | None:
+        """The image of the latest frame as a JPEG; None before the first one."""
         async with self._drawing:
-            latest = self.latest
-            if latest is not None and latest is not self._shown[0]:
-                self._shown = latest, await asyncio.to_thread(_jpeg, latest)
+            if detections is not None and detections is not self._shown[0]:
+                self._shown = detections, await asyncio.to_thread(_jpeg, detections)
             return self._shown[1]
+
+    async def _map(self, detections: Detections | None) -> bytes:
+        """The map of the latest frame as JSON; null before the first one."""
+        async with self._mapping:
+            if detections is not None and detections is not self._mapped[0]:
+                self._mapped = detections, await asyncio.to_thread(_map_json, detections)
+            return self._mapped[1]
 
 
 def _jpeg(detections: Detections) -> bytes:
-    return cv2.imencode(".jpg", detections.draw(), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+    picture = detections.draw()
+    draw_horizon(picture, detections.observation.view)
+    return cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
 
 
 def _map_json(detections: Detections) -> bytes:

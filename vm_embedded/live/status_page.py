@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import math
-import secrets
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -19,6 +18,7 @@ from .answering import Answer, Answerer
 from .control import REFUSED
 from .frame_views import FrameViews
 from .http_server import HttpServer, Page, Query, Response
+from .page_token import kept_token
 from .temperatures import read_temperatures
 from .threshold import threshold_name, with_settings, with_threshold
 
@@ -29,7 +29,8 @@ _REST = 4.0
 
 
 class StatusPage:
-    """The page and its two changes: a recording, and another threshold. Changes need `token`, which the log prints.
+    """The page and its two changes: a recording, and another threshold. Changes need `token`, which the log
+    prints. not_kept: why the next start will have another token; "" if it has the same.
 
     answerer: has detector and configuration. status, record, metrics: texts of the daemon. use_threshold: is called
     with name and value of a threshold that was changed.
@@ -43,7 +44,7 @@ class StatusPage:
         metrics: Callable[[], str],
         use_threshold: Callable[[str, float], None],
     ) -> None:
-        self.token = secrets.token_urlsafe(9)
+        self.token, self.not_kept = kept_token() if answerer.configuration.status.page else ("", "")
         self._answerer, self._status, self._record, self._metrics = answerer, status, record, metrics
         self._use_threshold = use_threshold
         self._html = _PAGE.read_bytes()
@@ -58,7 +59,7 @@ class StatusPage:
         metrics: dict[str, Page] = {"/metrics": self._metrics_page}
         if status.page:
             pages: dict[str, Page] = {"/": self._page, "/state": self._state, "/preview": self._preview}
-            pages |= metrics | {"/map": views.map}
+            pages |= metrics | {"/map": views.map, "/view": views.view}
             actions: dict[str, Page] = {"/record": self._start_recording, "/threshold": self._change_threshold}
             yield HttpServer(status.page, "--status-page", pages, {"/stream": views.stream}, actions, self.token)
         if status.metrics:

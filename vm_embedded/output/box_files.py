@@ -6,6 +6,8 @@ classes.txt, then center and size as shares of the image.
 
 candidates.jsonl has a line of JSON for each box with its confidence. It also has the near misses: rejected candidates
 that may be objects. They are in no YOLO file, because a tool would take them for objects.
+
+object.toml has the shape and size of the objects, so that the box of one follows from lens, pose and its place.
 """
 
 from __future__ import annotations
@@ -16,17 +18,21 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Floats, Image
+from ..arrays import Floats, Image, number_or_nan
 from ..cameras.frame_source import Frame
+from ..config.toml_reader import parse_toml
 from ..detection.detections import Detections, edges_in_image
-from ..errors import InputError
-from ..files import read_bytes, write_file
+from ..errors import InputError, VisualMeshError, unknown
+from ..files import exists, read_bytes, read_text, write_file
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
+from ..geometry.make_shape import make_shape
 from ..geometry.orientation import Orientation
+from ..geometry.shape import Shape
+from ..network.manifest import Manifest
 from .result_files import FrameNames, encode_png, make_folder
 
-CLASSES, CANDIDATES = "classes.txt", "candidates.jsonl"
+CLASSES, CANDIDATES, OBJECT = "classes.txt", "candidates.jsonl", "object.toml"
 
 Shares = tuple[float, float, float, float]
 """Center x and y, width and height of a box, as shares of the image's width and height."""
@@ -40,7 +46,7 @@ SAME_PLACE = 0.5
 _NEAR_MISS = 0.05
 """Lowest confidence of a near miss."""
 
-_LEAST_SIDE = 2.0
+LEAST_SIDE = 2.0
 """Boxes with a shorter side [px] are left out: nobody can judge them."""
 
 
@@ -57,18 +63,19 @@ class CandidateBox:
 class BoxWriter:
     """Writes a folder of boxes, frame by frame.
 
-    folder: must be new or empty. classes: names of the classes that have boxes, in the order of their numbers. Raises
-    InputError for a folder with files, or if it can't be created.
+    folder: must be new or empty. manifest: of the network; its classes of kind object have boxes. Raises InputError for
+    a folder with files, or if it can't be created.
     """
 
-    def __init__(self, folder: Path, classes: tuple[str, ...]) -> None:
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
         try:
             is_empty = not any(make_folder(folder).iterdir())
         except OSError as error:
             raise InputError(f"can't read folder {folder}: {error.strerror or error}") from error
         if not is_empty:
             raise InputError(f"--save-boxes {folder}: the folder is not empty; give a new one, to keep its labels")
-        self._folder, self._classes = folder, classes
+        self._folder, self._manifest = folder, manifest
+        self._classes = tuple(each.name for each in manifest.classes if each.kind == "object")
         self._names = FrameNames("image")  # so that the lens file belongs to the image
 
     def write(self, frame: Frame, image: Image, lens: Lens, orientation: Orientation, detections: Detections) -> Path:
@@ -79,6 +86,7 @@ class BoxWriter:
         """
         name, boxes = self._names.of(frame), _candidate_boxes(detections, (image.shape[1], image.shape[0]))
         if not (self._folder / CLASSES).exists():  # not earlier: if no frame can be processed, the folder stays empty
+            write_file(self._folder / OBJECT, _object_file(self._manifest))
             write_file(self._folder / CLASSES, "".join(f"{name}\n" for name in self._classes))
         path = self._folder / f"{name}{'.png' if frame.path is None else frame.path.suffix}"
         write_file(path, encode_png(image) if frame.path is None else read_bytes(frame.path))
@@ -96,6 +104,27 @@ class BoxWriter:
                 file.write(lines)
         except OSError as error:
             raise InputError(f"can't write {path}: {error.strerror or error}") from error
+
+
+def _object_file(manifest: Manifest) -> str:
+    height = f"height = {manifest.object_height!r}  # [m]\n" if manifest.object_height else ""
+    return f'shape = "{manifest.shape}"\nradius = {manifest.object_radius!r}  # [m]\n{height}'
+
+
+def read_object_file(folder: Path) -> Shape | None:
+    """The shape of the objects in a folder of boxes; None if it has no object.toml. Raises InputError."""
+    path = folder / OBJECT
+    if not exists(path):
+        return None
+    try:
+        table = parse_toml(read_text(path))
+        unexpected = table.keys() - {"shape", "radius", "height"}
+        if unexpected:
+            raise InputError(unknown("entry", min(unexpected), ("shape", "radius", "height")))
+        size = (number_or_nan(table.get("radius")), number_or_nan(table.get("height", 0.0)))
+        return make_shape(str(table.get("shape", "sphere")), *size)
+    except VisualMeshError as error:
+        raise InputError(f"{path}: {error}") from error
 
 
 def yolo_line(number: int, shares: Shares) -> str:
@@ -128,7 +157,7 @@ def bounding_box(outline: Floats, size: tuple[int, int]) -> Shares | None:
     if len(outline) < 3 or not np.isfinite(outline).all():
         return None
     low, high = edges_in_image(outline, size).reshape(2, 2)
-    if (high - low).min() < _LEAST_SIDE:
+    if (high - low).min() < LEAST_SIDE:
         return None
     x, y, width, height = np.concatenate([(low + high) / 2 / size, (high - low) / size]).round(6).tolist()
     return x, y, width, height

@@ -21,32 +21,30 @@ from .stream_options import add_stream
 
 _EPILOG = """\
 other commands (add --help for their options):
-  vm-train look DATA           train the close look of a network: it judges the network's proposals
-  vm-train look --boxes DIR    fine-tune the close look of a model file on your own frames
-  vm-train look-config         print a look.toml with all entries and their defaults
-  vm-train tune-config         print a tune.toml, the configuration of a fine-tuning
-  vm-train resume RUN          continue a training that was stopped
-  vm-train check DATA          count what the pictures show, and list the damaged ones
-  vm-train preview DATA        draw augmented pictures with the points of the mesh
-  vm-train rate DATA           find a learning rate
-  vm-train config              print a train.toml with all entries and their defaults
-  vm-train import FILES OUT    convert TFRecord files of the reference implementation to pictures
-  vm-train import-boxes DIR OUT  convert frames with boxes, lens and pose to pictures with masks
-  vm-train shards DATA OUT     pack pictures into tar files
+  vm-train look --boxes DIR      fine-tune a network on your own frames
+  vm-train look DATA             train the close look, which judges proposals
+  vm-train check DATA            count what the pictures show, list damaged ones
+  vm-train resume RUN            continue a training that was stopped
+  vm-train preview DATA          draw augmented pictures with points of the mesh
+  vm-train rate DATA             find a learning rate
+  vm-train import FILES OUT      convert TFRecord files of the reference
+  vm-train import-boxes DIR OUT  make masks of frames with boxes, lens and pose
+  vm-train shards DATA OUT       pack pictures into tar files
+  vm-train config, vm-train look-config, vm-train tune-config
+                                 print a configuration with all its entries
 
-On several GPUs or machines: torchrun --nproc-per-node=N -m vm_train DATA -o RUN
-Exit status: 0 success, 1 failure (standard error tells why), 2 wrong usage, 130 stopped.
+Exit status: 0 success, 1 failure (see standard error), 2 usage, 130 stopped
 """
 
 
 def parser() -> argparse.ArgumentParser:
     """The options of vm-train DATA."""
     made = Parser(
-        commands=tuple(re.findall(r"^  vm-train (\S+)", _EPILOG, re.MULTILINE)),
+        commands=tuple(dict.fromkeys(re.findall(r"vm-train ([a-z-]+)", _EPILOG))),
         prog="vm-train",
-        description="Train a network on a folder of pictures with masks, lenses and poses. It first checks all "
-        "pictures. You can stop or kill it at any time: vm-train resume continues. With one thread on a CPU, the final "
-        "network is the same as without the stop.",
+        usage="vm-train DATA -o RUN [options]",  # all of them would fill half a screen
+        description="Train a network on pictures with masks, lenses and poses. You can stop or kill\nit at any time: "
+        "vm-train resume continues.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -54,10 +52,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     _add_configuration(made)
     add_start(made)
-    made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
-    add_stream(made)
-    _add_lists(made)
-    _add_cache(made)
+    _add_pictures(made)
     _add_hardware(made)
     return made
 
@@ -142,9 +137,8 @@ def add_start(made: argparse.ArgumentParser) -> None:
         "--from",
         dest="start",
         metavar="MODEL",
-        help="begin with the weights of a trained network, not with random ones: a checkpoint (.pt), a model file "
-        f"(.onnx), or a network of the package ({', '.join(SHIPPED)}). Its classes, mesh and layers, and "
-        "training.rate 0.001, become the defaults of the configuration",
+        help=f"begin with this network: .pt, .onnx, or {', '.join(SHIPPED)}; its classes, mesh and layers become "
+        "defaults",
     )
 
 
@@ -153,32 +147,25 @@ def _add_data(made: argparse.ArgumentParser) -> None:
 
 
 def _add_configuration(made: argparse.ArgumentParser) -> None:
-    made.add_argument(
-        "--config", type=Path, metavar="FILE", help="configuration, train.toml; missing entries keep their defaults"
-    )
+    made.add_argument("--config", type=Path, metavar="FILE", help="train.toml; missing entries keep their defaults")
     add_set(made, "training.epochs=5")
 
 
-def _add_lists(made: argparse.ArgumentParser) -> None:
-    lists = made.add_argument_group(
-        "lists of pictures", "Text files with a picture number or image name on each line; default: split by [data]."
-    )
-    for part in ("training", "validation", "test"):
-        lists.add_argument(f"--{part}", type=Path, metavar="FILE", help=f"list of pictures for {part}")
-
-
-def _add_cache(made: argparse.ArgumentParser) -> None:
-    group = made.add_mutually_exclusive_group()
-    group.add_argument(
+def _add_pictures(made: argparse.ArgumentParser) -> None:
+    group = made.add_argument_group("pictures")
+    group.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
+    group.add_argument("--training", type=Path, metavar="FILE", help="list of pictures; default: split by [data]")
+    for part in ("validation", "test"):
+        group.add_argument(f"--{part}", type=Path, metavar="FILE", help=f"the same, for {part}")
+    cache = group.add_mutually_exclusive_group()
+    cache.add_argument(
         "--unpacked",
         type=Path,
         metavar="DIR",
-        help="cache folder for decoded pictures (1.3 MB per picture of 640 x 512 px); several trainings can share it; "
-        "default RUN/unpacked, which is removed at the end",
+        help="cache of decoded pictures; default RUN/unpacked",
     )
-    group.add_argument(
-        "--no-unpacked", action="store_true", help="do not cache decoded pictures; for slow or small disks"
-    )
+    cache.add_argument("--no-unpacked", action="store_true", help="no such cache; for slow or small disks")
+    add_stream(group)
 
 
 def _add_hardware(made: argparse.ArgumentParser) -> None:
@@ -188,11 +175,11 @@ def _add_hardware(made: argparse.ArgumentParser) -> None:
         "--workers",
         type=at_least(0),
         metavar="N",
-        help="processes that read pictures; default: half of the cores; with a GPU, all cores but one",
+        help="processes that read pictures; default: by the cores",
     )
     group.add_argument(
         "--threads",
         type=at_least(1),
         metavar="N",
-        help="computing threads; default 1; with more, the last digits of results differ from run to run",
+        help="default 1; with more, results vary in the last digits",
     )

@@ -22,24 +22,20 @@ _MOST_SHARDS, _MOST_DIGITS = 10**6, 20
 _RANGE = re.compile(r"\{(\d+)\.\.(\d+)\}")
 
 
-def add_stream(made: argparse.ArgumentParser) -> None:
+def add_stream(group: argparse._ArgumentGroup) -> None:
     """Add --stream and --epoch-pictures."""
-    group = made.add_argument_group(
-        "streaming",
-        "Read the training pictures from shards, without storing them; use all pictures of DATA for validation.",
-    )
     group.add_argument(
         "--stream",
         nargs="+",
         default=[],
         metavar="SHARD",
-        help="tar files, http addresses or pipe:COMMAND; {000000..000099} stands for 100 shards with these numbers",
+        help="train on tar files, addresses or pipe:COMMAND, {00..99} for 100 of them; DATA is for validation",
     )
     group.add_argument(
         "--epoch-pictures",
         type=int,
         metavar="N",
-        help="pictures per epoch; every epoch restarts the stream with the shards in another order",
+        help="pictures of the stream in an epoch",
     )
 
 

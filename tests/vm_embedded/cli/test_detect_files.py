@@ -107,6 +107,23 @@ def test_of_several_sources_none_may_be_live():
     one_complaint(run("synthetic", IMAGES[0], code=1), "only one live camera")
 
 
+def test_live_plays_the_images_of_a_pattern_in_their_order(tmp_path):
+    for number, image in enumerate((IMAGES[0], IMAGES[1], IMAGES[0])):
+        shutil.copy(image, tmp_path / f"image{10**number}.jpg")
+        shutil.copy(beside(image), tmp_path / f"lens{10**number}.yaml")
+    options = ("--model", MODEL, "--camera-max-age-ms", "10000", "--status-socket", tmp_path / "vm-detect.sock")
+    played = lines(run("image1*.jpg", "--live", "--camera-fps", "1", *options, cwd=tmp_path))
+    one, two, three = (each["detections"] for each in played if each["type"] == "frame")
+    assert one == three != two
+
+
+def test_live_takes_one_pattern_in_quotes_and_not_the_files_that_a_shell_makes_of_it(folder):
+    (line,) = run(*IMAGES[:3], "--live", code=1).stderr.splitlines()
+    assert "3 files" in line
+    assert "'frames/*.jpg' --live" in line
+    assert "no such camera" in run(folder / "other*.jpg", "--live", code=78).stderr
+
+
 @pytest.mark.parametrize("source", [".", "'*'", "*"])
 def test_the_other_files_of_a_set_of_vm_synth_are_no_frames(source, folder):
     for name in ("mask0000000.png", "coverage0000000.png"):

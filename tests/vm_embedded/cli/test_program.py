@@ -148,6 +148,18 @@ def test_bash_completes_options_values_and_commands(line, offered, tmp_path):
     assert completed(line, tmp_path) == offered
 
 
+def test_the_help_of_vm_train_and_its_completions_fit_on_a_screen(tmp_path):
+    done = run("vm-train", "--help", env=os.environ | {"COLUMNS": "80"})
+    text = done.stdout.splitlines()
+    assert len(text) <= 53
+    assert max(map(len, text)) <= 80
+    options, commands = completed("vm-train --", tmp_path), completed("vm-train ", tmp_path)
+    assert all(each in done.stdout for each in options)
+    assert all(f"vm-train {each}" in done.stdout for each in commands)
+    assert len(commands) == 11
+    assert len(options) < 25
+
+
 def test_an_option_like_no_other_is_named():
     done = run("vm-detect", "--camera", "x", "--xyzzy")
     assert done.returncode == 2

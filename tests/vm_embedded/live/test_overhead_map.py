@@ -1,6 +1,7 @@
 """The overhead map: the field of view on the plane, and what the page gets."""
 
 import asyncio
+import base64
 import json
 import math
 from dataclasses import replace
@@ -11,6 +12,7 @@ import pytest
 
 from tests.vm_embedded.output.features import demo_frame, scene
 from vm_embedded import Detector, Equidistant, Orientation, Rectilinear
+from vm_embedded.detection.overlay import draw_horizon
 from vm_embedded.live import frame_views
 from vm_embedded.live.frame_views import FrameViews
 from vm_embedded.live.overhead_map import REACH, field_of_view, overhead_map
@@ -71,6 +73,54 @@ def test_the_map_has_what_the_messages_have():
     assert made["detections"] == [each.as_dict() for each in detections]
     assert made["yaw"] == pytest.approx(math.atan2(view.heading[1, 0], view.heading[0, 0]), abs=1e-4)
     assert overhead_map(detections)["field"] is None
+
+
+def test_the_picture_and_the_map_of_a_view_are_of_one_frame(monkeypatch):
+    """Also if the next frame comes while they are made."""
+    views, drawn = FrameViews(1000.0), frame_views._jpeg
+    first, second = demo_frame(0)[1], demo_frame(6)[1]
+
+    def draw(detections):
+        views.show(second)
+        return drawn(detections)
+
+    async def ask():
+        assert (await views.view({})).content == b"null"
+        views.show(first)
+        monkeypatch.setattr(frame_views, "_jpeg", draw)
+        one = json.loads((await views.view({"after": "0"})).content)
+        monkeypatch.setattr(frame_views, "_jpeg", drawn)
+        two = json.loads((await views.view({"after": str(one["number"])})).content)
+        monkeypatch.setattr(frame_views, "_REPEAT", 0.01)
+        assert (await views.view({"after": str(two["number"])})).content == b"null"
+        return one, two
+
+    for given, frame in zip((first, second), asyncio.run(ask()), strict=True):
+        assert base64.b64decode(frame["picture"]) == drawn(given)
+        assert frame["map"] == json.loads(json.dumps(overhead_map(given)))
+
+
+@pytest.mark.parametrize("pitch", [0.0, 0.2, -0.3])
+@pytest.mark.parametrize("roll", [0.0, 0.1])
+def test_the_horizon_is_where_level_rays_are(pitch, roll):
+    view = view_of(Orientation.from_roll_pitch(0.8, roll, pitch, 2.0), Rectilinear(focal_length=448, fov=1.75))
+    canvas = np.zeros((view.size[1], view.size[0], 3), np.uint8)
+    draw_horizon(canvas, view)
+    rows, columns = np.nonzero(canvas.max(axis=2) > 150)
+    middle = (view.size[0] - 1) / 2
+    place = np.polyval(np.polyfit(columns, rows, 1), middle)
+    level = (view.size[1] - 1) / 2 - 448 * math.tan(pitch) / math.cos(roll)
+    assert place == pytest.approx(level, abs=1.5)
+    assert columns.min() <= 1
+    assert columns.max() >= view.size[0] - 2
+    assert np.polyfit(columns, rows, 1)[0] == pytest.approx(-math.tan(roll), abs=0.01)
+
+
+def test_a_picture_of_the_ground_has_no_horizon():
+    view = view_of(Orientation.from_roll_pitch(0.8, 0.0, 1.4), Rectilinear(focal_length=448, fov=1.75))
+    canvas = np.zeros((view.size[1], view.size[0], 3), np.uint8)
+    draw_horizon(canvas, view)
+    assert not canvas.any()
 
 
 def test_maps_are_computed_when_asked_for_and_once_for_all(monkeypatch):

@@ -29,6 +29,13 @@ return picture.naturalWidth + ":" + pixels.reduce((sum, each) => (sum * 31 + eac
 """A number that tells the shown picture from others, after its width."""
 
 
+BOTTOM = "return document.querySelector(arguments[0]).getBoundingClientRect().bottom"
+SAME = """
+return [document.querySelector("#map text.ball").textContent, document.getElementById("found").textContent];
+"""
+RIGHT = BOTTOM.replace("bottom", "right")
+
+
 def free_address():
     with socket.socket() as made:
         made.bind(("127.0.0.1", 0))
@@ -92,7 +99,7 @@ def test_the_page_previews_a_threshold_uses_it_and_records_with_the_token_of_the
 @pytest.mark.long
 def test_the_addresses_of_the_documentation_answer(tmp_path):
     addresses = re.findall(r"^\| `(GET|POST) (\S+)`", DAEMON.read_text(), re.MULTILINE)
-    assert len(addresses) == 8
+    assert len(addresses) == 9
     where = free_address()
     options = ("--camera", "synthetic", "--status-page", where, "--recorder-folder", tmp_path / "recordings")
     with running(tmp_path, *options) as found:
@@ -105,7 +112,7 @@ def test_the_addresses_of_the_documentation_answer(tmp_path):
             with urlopen(request, timeout=60.0) as answer:
                 assert answer.status == 200
                 content = answer.read(300)
-            if address in ("/state", "/map"):
+            if address in ("/state", "/map", "/view?after=0"):
                 assert content.startswith(b'{"'), address
             if method == "POST":
                 assert content.endswith(b"\n"), address  # so that a shell's prompt begins a line
@@ -123,12 +130,16 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         def text(name):
             return browser.find_element("id", name).text
 
+        def bottom(selector):
+            return browser.execute_script(BOTTOM, selector)
+
         def moves():
             marks = set()
             wait(lambda: marks.add(browser.execute_script(MARK)) or len(marks) > 3)
             return all(each.startswith("640:") for each in marks)
 
         wait(lambda: text("state") == "ok")
+        wait(lambda: browser.execute_script(MARK).startswith("640:"))
         assert moves()
         wait(lambda: "/s" in text("now"))
         rate = float(text("now").split("frames answered")[1].split("/s")[0])
@@ -136,6 +147,15 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         wait(lambda: "ball" in text("found"))
         wait(lambda: browser.find_elements("css selector", "#map .ball"))
         assert browser.find_elements("css selector", "#map path.view")
+        for _ in range(5):  # the map and the list are of one frame
+            on_map, in_list = browser.execute_script(SAME)
+            assert on_map in in_list
+        for size in ((1700, 1000), (1200, 800)):
+            browser.set_window_size(*size)
+            wait(lambda: abs(bottom("#overhead") - bottom("#picture")) < 2)
+            assert bottom("#picture") - bottom("header") > 0.5 * size[1]
+            assert bottom("#map") > 0.85 * bottom("#picture")
+            assert browser.execute_script(RIGHT, "#overhead") > 0.95 * size[0]
         assert "in view" in text("legend")
         browser.save_screenshot(str(tmp_path / "page.png"))
         wait(lambda: text("state") == "camera_lost")
@@ -144,6 +164,21 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         assert moves()
         found.stop()
         wait(lambda: text("state") == "no response")
+
+
+@pytest.mark.long
+def test_the_token_survives_a_restart_and_others_can_not_read_it(tmp_path):
+    tokens = []
+    for _ in range(2):
+        options = ("--camera", "synthetic", "--status-page", free_address())
+        with running(tmp_path, *options, env={"STATE_DIRECTORY": str(tmp_path / "state")}) as found:
+            found.wait(lambda found=found: any(each["event"] == "status page" for each in found.events))
+            tokens += [each["token"] for each in found.events if each["event"] == "status page"]
+            found.stop()
+    assert tokens[0] == tokens[1]
+    (kept,) = (tmp_path / "state").iterdir()
+    assert kept.read_text().strip() == tokens[0]
+    assert kept.stat().st_mode & 0o777 == 0o600
 
 
 def test_frames_get_four_times_the_time_of_previews(monkeypatch):
@@ -161,7 +196,9 @@ def test_frames_get_four_times_the_time_of_previews(monkeypatch):
     async def send(_):
         return None
 
-    answerer = SimpleNamespace(configuration=SimpleNamespace(status=SimpleNamespace(picture_fps=5.0)), detector=None)
+    answerer = SimpleNamespace(
+        configuration=SimpleNamespace(status=SimpleNamespace(picture_fps=5.0, page="")), detector=None
+    )
     page = status_page.StatusPage(answerer, *4 * (dict,))
     page._views = SimpleNamespace(latest="a frame", preview=send)
 
