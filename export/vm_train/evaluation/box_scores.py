@@ -68,7 +68,7 @@ class JudgedFrame:
 
         largest = max(missed, key=_size, default=None)
         return WorstErrors(
-            () if largest is None else (error(largest, _size(largest) / 2.0),),
+            () if largest is None else (error(largest, _size(largest)),),
             tuple(error(each.box, each.probability) for each in false[:1]),
         )
 

@@ -51,7 +51,7 @@ def check_boxes(boxes: BoxedSet, name: str, folder: str) -> None:
         raise InputError(f"no picture of {folder} can be used: vm-train check {folder} --boxes tells why")
     if not counts[name]:
         raise InputError(
-            f"{folder} has no box of class {name}, which the close look judges; {rename_advice(counts, name)}"
+            f"{folder} has no box of class {name}, which the network finds; {rename_advice(counts, name)}"
         )
 
 
