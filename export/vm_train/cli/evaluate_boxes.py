@@ -49,6 +49,9 @@ def run_boxes(options: argparse.Namespace) -> int:
     frames = _chosen(found.pictures, options.boxes, options.list, options.part)
     posed = sum(_has_pose(each) for each in frames)
     search = None if posed == len(frames) else Search.of(found.pictures, name, is_round(manifest))
+    bare = next((each for each, model in models.items() if model.manifest.look is None), None)
+    if search is not None and bare is not None:
+        raise InputError(f"{bare} has no close look, so it needs lens and pose of each frame")
     bar = ProgressBar(len(frames) * len(models), "vm-evaluate")
     try:
         workers = options.workers or len(os.sched_getaffinity(0))

@@ -68,7 +68,8 @@ class Search:
 
 @dataclass(frozen=True)
 class Trial:
-    """A network to try. name: as the user knows it. search: for its close look alone; None: the whole detector."""
+    """A network to try. name: as the user knows it. search: for its close look alone, which it must have; None: the
+    whole detector."""
 
     name: str
     model: Path
@@ -83,8 +84,7 @@ class Trial:
             settings = replace(self.settings, min_confidence=lowest, field_features=False)
             return partial(_found_by_detector, Detector(model, settings), judged_class(model.manifest, self.name))
         look = CloseLook.of(model)
-        if look is None:
-            raise InputError(f"{self.name} has no close look, so it needs lens and pose of each frame")
+        assert look is not None
         return partial(_found_by_look, look, self.search)
 
     def scores(self, frames: Sequence[BoxedPicture], name: str, workers: int, report: Callable[[], None]) -> BoxScores:

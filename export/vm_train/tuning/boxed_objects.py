@@ -50,9 +50,7 @@ def check_boxes(boxes: BoxedSet, name: str, folder: str) -> None:
     if not boxes.pictures:
         raise InputError(f"no picture of {folder} can be used: vm-train check {folder} --boxes tells why")
     if not counts[name]:
-        raise InputError(
-            f"{folder} has no box of class {name}, which the network finds; {rename_advice(counts, name)}"
-        )
+        raise InputError(f"{folder} has no box of class {name}, which the network finds; {rename_advice(counts, name)}")
 
 
 def hold_out(pictures: Sequence[BoxedPicture], share: float, seed: int) -> set[int]:

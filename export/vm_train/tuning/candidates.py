@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
-from vm_embedded.detection.looking import LARGEST_SIZE, Look, chain_of, look_at
+from vm_embedded.detection.looking import Look, chain_of, look_at
+from vm_embedded.detection.peaks import LARGEST_SIZE
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
 

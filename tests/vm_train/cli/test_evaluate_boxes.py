@@ -77,7 +77,7 @@ def test_without_lens_the_close_look_is_scored(without_lenses, tmp_path):
 
 def test_a_frame_without_pose_among_others_is_told(boxes, tmp_path):
     folder = shutil.copytree(boxes, tmp_path / "some")
-    sorted(folder.glob("lens*"))[0].unlink()
+    min(folder.glob("lens*")).unlink()
     done = run("--boxes", folder, "ball-small", "--workers", 1)
     assert "the close look alone" in done.stdout
     assert "Only 3 of the 4 frames have a lens file" in done.stderr
