@@ -17,13 +17,13 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
-from typing import Any
 
 from vm_embedded.output.box_files import Shares, edges, overlap
-from vm_label.box_folder import read_candidates
+from vm_label.box_folder import read_box_folder
+from vm_label.crops import Crop
 
 LENS = "projection: EQUIDISTANT\nfocal_length: 260\ncentre: [0, -40]\nfov: 3.2\nsize: [608, 800]\n"
 CAMERA = ("--lens", "lens.yaml", "--height", "0.8", "--pitch", "12deg", "--object-radius", "0.11")
@@ -117,18 +117,15 @@ def label(loop: Loop, truth: Path) -> int:
     assert address is not None
     with urllib.request.urlopen(address[0] + "state") as response:
         state = json.load(response)
-    by_image: dict[str, list[dict[str, Any]]] = {}
-    for crop in state["crops"]:
-        by_image.setdefault(crop["image"], []).append(crop)
+    by_image: dict[str, list[Crop]] = {}
+    for crop in read_box_folder(loop.folder / "boxes").crops:
+        by_image.setdefault(crop.image, []).append(crop)
     judged = count = 0
-    shown = _boxes(loop.folder / "boxes")
-    for image in by_image:
+    for image in dict.fromkeys(each["image"] for each in state["crops"]):
         true = true_boxes(truth / (Path(image).stem.removeprefix("image-") + ".txt"))
-        crops = by_image[image]
-        # The page lists the crops of an image by confidence, and the file as well.
-        answers = answers_for([shown[image, crop["class"], crop["confidence"]] for crop in crops], true)
-        for crop, answer in zip(crops, answers, strict=True):
-            body = json.dumps({"session": state["session"], "crop": crop["id"], "answer": answer}).encode()
+        answers = answers_for([crop.shares for crop in by_image[image]], true)
+        for crop, answer in zip(by_image[image], answers, strict=True):
+            body = json.dumps({"session": state["session"], "crop": crop.id, "answer": answer}).encode()
             request = urllib.request.Request(address[0] + "answer", body, {"Content-Type": "application/json"})
             urllib.request.urlopen(request).close()
             count += 1
@@ -138,16 +135,6 @@ def label(loop: Loop, truth: Path) -> int:
     page.terminate()
     print(page.communicate()[0])
     return count
-
-
-def _boxes(folder: Path) -> Mapping[tuple[str, str, float | None], Shares]:
-    """The boxes that the page shows, by image, class and confidence."""
-    return {
-        (f"{path.parent.name}/{image}", each.class_name, each.confidence): each.shares
-        for path in folder.glob("*/candidates.jsonl")
-        for image, found in read_candidates(path)[0].items()
-        for each in found
-    }
 
 
 def main() -> None:

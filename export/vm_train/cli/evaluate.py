@@ -42,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if given[:1] == ["points"]:
                 return run_points(points_parser().parse_args(given[1:]))
             if any(each.partition("=")[0] == "--boxes" for each in given):
-                return run_boxes(boxes_parser().parse_args(given))
+                asks = {"-h", "--help"}.intersection(given)  # --boxes alone would want its folder first
+                return run_boxes(boxes_parser().parse_args(["--help"] if asks else given))
             return _evaluate(parser().parse_args(given))
     except ImportError as error:
         print(f"vm-evaluate: {not_installed(error, 'train')}", file=sys.stderr)

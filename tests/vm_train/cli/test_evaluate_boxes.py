@@ -110,6 +110,10 @@ def test_mistakes_are_told_in_one_line(boxes, without_lenses, tmp_path, capsys):
     assert main(["--boxes", str(boxes), str(bare), "--workers", "1"]) == 0  # with lens and pose, it needs none
 
 
+def test_its_help_needs_no_folder():
+    assert "--boxes DIR" in run("--boxes", "--help").stdout
+
+
 def test_an_evaluation_of_another_kind_in_the_folder_is_replaced(boxes, tmp_path):
     out = tmp_path / "out"
     run("--boxes", boxes, "ball", "-o", out, "--workers", 1)
