@@ -35,7 +35,10 @@ def run_boxes(options: argparse.Namespace) -> int:
     from ..tuning.boxed_objects import check_boxes, is_round
 
     settings = detector_settings(options)
-    models = {name: read_model(model_path(name)) for name in options.models}
+    given = [*options.models, *(each for each in options.names if "=" not in each)]
+    if not given:
+        raise InputError("give one network or several: model files (.onnx), or ball, ball-small or soccer")
+    models = {name: read_model(model_path(name)) for name in given}
     classes = {judged_class(each.manifest, name): each.manifest for name, each in models.items()}
     if len(classes) > 1:
         raise InputError(f"the networks find objects of different classes, {', '.join(classes)}: evaluate each alone")
@@ -43,7 +46,7 @@ def run_boxes(options: argparse.Namespace) -> int:
     if options.output is not None:
         paths = (each.path for each in models.values())
         check_evaluation_folder(options.output, (*paths, options.list, options.config))
-    found = read_boxes(options.boxes, options.format, parse_names(options.names))
+    found = read_boxes(options.boxes, options.format, parse_names([each for each in options.names if "=" in each]))
     _complain(finding_lines(found.findings, False, f"vm-train check {options.boxes} --boxes --verbose lists all"))
     check_boxes(found, name, str(options.boxes))
     frames = _chosen(found.pictures, options.boxes, options.list, options.part)

@@ -71,7 +71,7 @@ def boxes_parser() -> argparse.ArgumentParser:
     )
     made.add_argument(
         "models",
-        nargs="+",
+        nargs="*",  # an option --names before them takes them along; see run_boxes
         metavar="MODEL",
         help="model file (.onnx), or one from the package: ball, ball-small or soccer",
     )

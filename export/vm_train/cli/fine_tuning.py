@@ -142,7 +142,8 @@ def _fine_tune(run: TuningRun, options: argparse.Namespace) -> int:
         raise KeyboardInterrupt
     print(f"report: {run.folder / 'report.html'}")
     if run.split.test:
-        measured = f"vm-evaluate --boxes {run.boxes.folder} --list {run.split_path} {run.model} {run.model_path}"
-        print(f"next: {measured} -o evaluation")
+        names = "".join(f" {old}={new}" for old, new in run.boxes.names.items())
+        frames = f"{run.boxes.folder}{names and ' --names' + names} --list {run.split_path}"
+        print(f"next: vm-evaluate --boxes {frames} {run.model} {run.model_path} -o evaluation")
     print(f"next: vm-detect --model {run.model_path} {_frames_to_try(run)} --save-overlay found")
     return EXIT_OK

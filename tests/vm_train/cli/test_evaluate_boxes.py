@@ -100,6 +100,7 @@ def test_a_list_chooses_the_frames_and_test_is_the_default(boxes, tmp_path, caps
 
 def test_mistakes_are_told_in_one_line(boxes, without_lenses, tmp_path, capsys):
     assert "has no box of class ball" in complaint(capsys, "--boxes", boxes, "ball", "--names", "ball=football")
+    assert "give one network or several" in complaint(capsys, "--boxes", boxes, "--names", "0=ball")
     assert "there is no folder" in complaint(capsys, "--boxes", tmp_path / "nowhere", "ball")
     assert "not an ONNX file; vm-export" in complaint(capsys, "--boxes", boxes, CHECKPOINT)
     (tmp_path / "report.html").write_text("mine")
@@ -108,6 +109,13 @@ def test_mistakes_are_told_in_one_line(boxes, without_lenses, tmp_path, capsys):
     run_program("vm-export", "ball-small", "--no-look", "-o", bare)
     assert "has no close look" in complaint(capsys, "--boxes", without_lenses, bare, "--workers", 1)
     assert main(["--boxes", str(boxes), str(bare), "--workers", "1"]) == 0  # with lens and pose, it needs none
+
+
+def test_networks_may_follow_new_names(without_lenses):
+    """Although --names takes all that follows."""
+    (without_lenses / "classes.txt").unlink()
+    done = run("--boxes", without_lenses, "--workers", 1, "--names", "0=ball", "ball-small")
+    assert "ball-small" in done.stdout
 
 
 def test_its_help_needs_no_folder():

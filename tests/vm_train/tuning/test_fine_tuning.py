@@ -54,8 +54,8 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
     assert re.search(r"model.onnx: in 4 frames for the test, it finds \d+ of \d+ boxes and \d+ false", lines[7])
     assert lines[9:] == [
         f"report: {folder / 'report.html'}",
-        f"next: vm-evaluate --boxes {frames} --list {folder / 'pictures.json'} ball-small {folder / 'model.onnx'} "
-        "-o evaluation",
+        f"next: vm-evaluate --boxes {frames} --names 0=ball --list {folder / 'pictures.json'} ball-small "
+        f"{folder / 'model.onnx'} -o evaluation",
         f"next: vm-detect --model {folder / 'model.onnx'} FRAMES --lens LENS.yaml --height METERS --pitch ANGLE "
         "--save-overlay found",
     ]
