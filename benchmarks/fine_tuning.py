@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.window_scores import score_frames
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.close_look import CloseLook
@@ -30,7 +31,6 @@ from vm_train.boxes.read import read_boxes
 from vm_train.cli.box_options import parse_names
 from vm_train.tuning.boxed_objects import all_objects
 from vm_train.tuning.candidates import search_radii
-from vm_train.tuning.window_scores import score_frames
 from vm_workstation.plots import new_figure, save_figure
 
 COUNTS = (25, 50, 100, 0)
@@ -47,7 +47,6 @@ def measure(model: Path, frames: Sequence[BoxedPicture], name: str) -> dict[str,
     bar = ProgressBar(len(frames), "looked at")
     score = score_frames(look, frames, name, True, radii, bar.advance)
     bar.clear()
-    assert score is not None
     return score.as_dict()
 
 
@@ -77,6 +76,7 @@ def fine_tune(model: str, frames: Sequence[BoxedPicture], seed: int, folder: Pat
     else:
         command += ["look", "--from", model, "--boxes", str(folder / "frames"), "--names", *names]
         command += ["-o", str(folder / "run"), "--set", f"training.seed={seed}", "--set", f"data.split_seed={seed}"]
+        command += ["--set", "data.test=0"]
     start = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     seconds = None if is_continued else round(time.perf_counter() - start)

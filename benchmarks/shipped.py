@@ -195,7 +195,7 @@ def _numbered(cell: np.ndarray, number: int) -> np.ndarray:
 
 
 def _said(error: WorstError, missed: bool) -> str:
-    name = error.files.image.stem
+    name = error.image.stem
     return f"{name}: missed, {error.radius:.0f} px" if missed else f"{name}: false, confidence {error.rank:.2f}"
 
 

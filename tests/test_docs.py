@@ -163,7 +163,7 @@ def test_commands_are_what_the_programs_take(page, docs_script, capsys):
         command = f"{program} {words[0]}" if words else ""
         parser = parsers[command] if command in parsers else parsers[program]
         try:
-            parser.parse_args(words[1:] if command in parsers else words)
+            parser.parse_args(words[1:] if command in parsers and words[0][0] != "-" else words)
         except SystemExit:
             pytest.fail(f"{name_of(page)}: {line}\n{capsys.readouterr().err}")
 

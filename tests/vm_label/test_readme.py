@@ -1,5 +1,6 @@
 """The README's way from a recording to a network that has learned from it, command by command."""
 
+import json
 import math
 import shlex
 
@@ -34,8 +35,9 @@ def write_recording(folder):
 def test_the_readme_leads_from_a_recording_to_a_tuned_network(tmp_path):
     write_recording(tmp_path)
     block = README.read_text().split("## Learn from your own frames")[1].split("```")[1]
+    shown = {}
     commands = [shlex.split(line, comments=True) for line in block.splitlines()[1:] if line]
-    assert [each[0] for each in commands] == ["vm-detect", "vm-label", "vm-label", "vm-train"]
+    assert [each[0] for each in commands] == ["vm-detect", "vm-label", "vm-label", "vm-train", "vm-evaluate"]
     for words in commands:
         if words == ["vm-label", "boxes"]:  # its page has tests of its own; here every answer is yes
             with AnswerFile(tmp_path / "boxes") as answers:
@@ -43,7 +45,13 @@ def test_the_readme_leads_from_a_recording_to_a_tuned_network(tmp_path):
                     answers.append(crop, "yes")
             continue
         less = [word for each in LESS for word in ("--set", each)] if words[0] == "vm-train" else []
-        shown = run(words + less, tmp_path)
+        shown[words[0]] = run(words + less, tmp_path)
     assert len(list((tmp_path / "judged").glob("*.png"))) == 12
-    assert "not measured, because no frames are for validation" in shown  # a single recording
+    assert "8 for training, 0 for validation, 4 for the test" in shown["vm-train"]  # a single recording
+    assert "in 4 frames for the test, it finds" in shown["vm-train"]
+    assert "4 of 12 frames of judged" in shown["vm-evaluate"]
+    assert "the whole detector" in shown["vm-evaluate"]
+    networks = json.loads((tmp_path / "report" / "scores.json").read_text())["networks"]
+    assert [each["network"] for each in networks] == ["ball", "tuned/model.onnx"]
+    assert networks[0]["scores"]["all"]["boxes"] == 4
     assert read_model(tmp_path / "tuned" / "model.onnx").manifest.look is not None

@@ -85,9 +85,9 @@ def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
         pose.add_argument(f"--{name}", type=entries[name], metavar="ANGLE", help=f"{meaning} [rad]; default 0")
 
 
-def add_settings(parser: argparse.ArgumentParser) -> None:
-    """Add an option for each field of Settings."""
-    _add_section(parser.add_argument_group("settings"), Settings, "")
+def add_settings(parser: argparse.ArgumentParser, skip: Sequence[str] = ()) -> None:
+    """Add an option for each field of Settings, except those in `skip`."""
+    _add_section(parser.add_argument_group("settings"), Settings, "", skip)
 
 
 def add_live(parser: argparse.ArgumentParser) -> None:

@@ -26,6 +26,14 @@ def add_box_options(parser: argparse._ActionsContainer) -> None:
     )
 
 
+def divided_remark(part: str) -> str:
+    """What to say if `hold_out` divided the recordings. part: of the frames."""
+    return (
+        f"no recording is small enough to be held out as a whole, so the last third of each one is for {part}; "
+        "frames of another recording would tell more"
+    )
+
+
 def parse_names(texts: Sequence[str]) -> dict[str, str]:
     """The new names by the old ones, from texts OLD=NEW. Raises InputError for other texts and contradictions."""
     names: dict[str, str] = {}

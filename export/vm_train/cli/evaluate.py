@@ -6,23 +6,23 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import vm_embedded
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, program
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError, VisualMeshError, not_installed
-from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.bundled import model_path
 from vm_workstation.stopping import stoppable
 
+from .evaluate_boxes import run_boxes
 from .evaluate_calibrate import run_calibrate
-from .evaluate_options import calibrate_parser, points_parser
+from .evaluate_options import boxes_parser, calibrate_parser, points_parser
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
 from .evaluate_points import run_points
-from .evaluating import evaluate_with_progress, other_radii
+from .evaluating import detector_settings, evaluate_with_progress, other_radii
 
 if TYPE_CHECKING:
     from vm_embedded.network.look_contract import LookContract
@@ -41,6 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 return run_calibrate(calibrate_parser().parse_args(given[1:]))
             if given[:1] == ["points"]:
                 return run_points(points_parser().parse_args(given[1:]))
+            if any(each.partition("=")[0] == "--boxes" for each in given):
+                asks = {"-h", "--help"}.intersection(given)  # --boxes alone would want its folder first
+                return run_boxes(boxes_parser().parse_args(["--help"] if asks else given))
             return _evaluate(parser().parse_args(given))
     except ImportError as error:
         print(f"vm-evaluate: {not_installed(error, 'train')}", file=sys.stderr)
@@ -65,8 +68,10 @@ def _evaluate(options: argparse.Namespace) -> int:
     from ..evaluation.summary import lines
     from ..evaluation.workers import Job
 
+    if options.format not in (None, "bgr"):
+        raise InputError(f"--format must be bgr, not {options.format}: vm-evaluate reads all pictures as bgr")
     options.model = model_path(options.model)
-    settings = _settings(options)
+    settings = detector_settings(options)
     pictures = select_pictures(options.data, options.list, options.part)
     rules = Rules(options.radius_of, options.min_radius, options.strict)
     check_evaluation_folder(options.output, (options.model, options.list, options.config))
@@ -95,15 +100,6 @@ def _subject(options: argparse.Namespace, settings: Settings) -> Subject:
             "--object-radius"
         )
     return load_subject(options.model, settings, options.as_robot)
-
-
-def _settings(options: argparse.Namespace) -> Settings:
-    configured = read_configuration(options.config).detector if options.config else Settings()
-    given = {each.name: getattr(options, each.name) for each in fields(Settings)}
-    if given["format"] not in (None, "bgr"):
-        raise InputError(f"--format must be bgr, not {given['format']}: vm-evaluate reads all pictures as bgr")
-    chosen = {name: value for name, value in given.items() if value is not None}
-    return replace(configured, **{**chosen, "format": "bgr"})
 
 
 def _about(options: argparse.Namespace, settings: Settings, subject: Subject, colors: Any) -> dict[str, Any]:

@@ -10,8 +10,12 @@ from vm_embedded.cli.options import add_settings
 from vm_embedded.cli.program import Parser
 from vm_workstation.option_types import at_least
 
+from .box_options import add_box_options
+
 _EPILOG = """\
 other commands, with their own --help:
+  vm-evaluate --boxes DIR MODEL [MODEL ...]
+                          score what networks find in your own frames with boxes, side by side
   vm-evaluate calibrate   make the confidence of a model file fit pictures: of the objects that it finds with confidence
                           0.9, nine of ten are then right
   vm-evaluate points      draw the paper's figure of points on a ball over its distance; it needs no network
@@ -52,6 +56,53 @@ def parser() -> argparse.ArgumentParser:
         "--config", type=Path, metavar="FILE", help="vm.toml with detector settings; the options below override them"
     )
     add_settings(made)
+    return made
+
+
+def boxes_parser() -> argparse.ArgumentParser:
+    """The options of vm-evaluate --boxes."""
+    made = Parser(
+        prog="vm-evaluate --boxes",
+        usage="vm-evaluate --boxes DIR [options] MODEL [MODEL ...]",
+        description="Score what networks find in your own frames with boxes, side by side: for example a network "
+        "before and after fine-tuning. If each frame has a lens file with a pose, this runs the whole detector. "
+        "Otherwise, the close look alone searches the images. An object is found if its box and yours have an IoU of "
+        "at least 0.5.",
+    )
+    made.add_argument(
+        "models",
+        nargs="*",  # an option --names before them takes them along; see run_boxes
+        metavar="MODEL",
+        help="model file (.onnx), or one from the package: ball, ball-small or soccer",
+    )
+    made.add_argument(
+        "--boxes",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="folder of frames with boxes, in YOLO, Pascal VOC or COCO format",
+    )
+    made.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="OUT",
+        help="folder to write to: scores.json, and report.html with pictures of the worst errors; default: only print "
+        "the scores",
+    )
+    made.add_argument(
+        "--list",
+        type=Path,
+        metavar="FILE",
+        help="evaluate only these frames: the pictures.json of a fine-tuning",
+    )
+    made.add_argument("--part", choices=("test", "validation", "training"), help="part of pictures.json; default test")
+    add_box_options(made)
+    _add_workers(made)
+    made.add_argument(
+        "--config", type=Path, metavar="FILE", help="vm.toml with detector settings; the options below override them"
+    )
+    add_settings(made, skip=("format",))
     return made
 
 
@@ -168,7 +219,7 @@ def points_parser() -> argparse.ArgumentParser:
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
     """All parsers by command, as typed."""
-    return {each.prog: each for each in (parser(), calibrate_parser(), points_parser())}
+    return {each.prog: each for each in (parser(), boxes_parser(), calibrate_parser(), points_parser())}
 
 
 def _color(text: str) -> tuple[str, tuple[int, int, int]]:

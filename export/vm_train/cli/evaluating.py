@@ -1,20 +1,32 @@
-"""An evaluation with a progress bar and a line for each skipped picture."""
+"""The settings of an evaluation, its progress bar, and a line for each skipped picture."""
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 from vm_embedded.cli.progress import ProgressBar
+from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
+from vm_embedded.live.configuration import read_configuration
 
 if TYPE_CHECKING:
     from ..data.picture_files import PictureFiles
     from ..evaluation.answers import Subject
     from ..evaluation.evaluation import Evaluation
     from ..evaluation.workers import Job
+
+
+def detector_settings(options: argparse.Namespace) -> Settings:
+    """The settings of --config, and of the options, which override them. Raises InputError."""
+    configured = read_configuration(options.config).detector if options.config else Settings()
+    given = {each.name: getattr(options, each.name) for each in fields(Settings) if each.name != "format"}
+    chosen = {name: value for name, value in given.items() if value is not None}
+    return replace(configured, **chosen, format="bgr")
 
 
 def evaluate_with_progress(

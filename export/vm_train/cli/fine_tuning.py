@@ -17,7 +17,7 @@ from vm_embedded.network.bundled import model_path
 from ..boxes.findings import finding_lines
 from ..learning.folder_access import locked
 from ..tuning.configuration import TUNING_HEADER, TuningConfiguration
-from .box_options import parse_names
+from .box_options import divided_remark, parse_names
 from .training import stop_requests
 
 if TYPE_CHECKING:
@@ -90,6 +90,8 @@ def _check_device(device: str) -> None:
 
 def _describe(run: TuningRun, boxes: Path) -> None:
     """Print the numbers of frames, and what is left out."""
+    from ..tuning.boxed_objects import divided
+
     look = run.before.manifest.look
     if look is not None and look.is_wide:
         print(
@@ -97,18 +99,15 @@ def _describe(run: TuningRun, boxes: Path) -> None:
             flush=True,
         )
     recordings = len({each.recording for each in run.pictures})
-    count = len(run.split.training), len(run.split.validation)
+    split = run.split
+    count = len(split.training), len(split.validation), len(split.test)
     print(
         f"{boxes}: {len(run.pictures)} frames of {recordings} recording{'s' * (recordings != 1)}: {count[0]} for "
-        f"training, {count[1]} for validation",
+        f"training, {count[1]} for validation, {count[2]} for the test",
         flush=True,
     )
-    if not count[1]:
-        print(
-            "vm-train: no recording is small enough to be kept for validation, so nothing measures the result: record "
-            "several times, and put the frames of each recording into a folder of its own",
-            file=sys.stderr,
-        )
+    if divided(run.pictures, map(int, split.test)):
+        print(f"vm-train: {divided_remark('the test')}", file=sys.stderr)
     if count[0] < _FEW:
         print(
             f"vm-train: with fewer than {_FEW} frames for training, the result depends much on chance; about 50 of "
@@ -118,8 +117,8 @@ def _describe(run: TuningRun, boxes: Path) -> None:
 
 
 def _frames_to_try(run: TuningRun) -> str:
-    """What to give vm-detect: a folder of frames with lens files, if possible for validation, or what to fill in."""
-    for each in run.part((*run.split.validation, *run.split.training)):
+    """What to give vm-detect: a folder of frames with lens files, if possible of the test, or what to fill in."""
+    for each in run.part((*run.split.test, *run.split.validation, *run.split.training)):
         if each.lens is not None:
             return str(each.image.parent)
     return "FRAMES --lens LENS.yaml --height METERS --pitch ANGLE"
@@ -142,5 +141,9 @@ def _fine_tune(run: TuningRun, options: argparse.Namespace) -> int:
     if not finished:
         raise KeyboardInterrupt
     print(f"report: {run.folder / 'report.html'}")
+    if run.split.test:
+        names = "".join(f" {old}={new}" for old, new in run.boxes.names.items())
+        frames = f"{run.boxes.folder}{names and ' --names' + names} --list {run.split_path}"
+        print(f"next: vm-evaluate --boxes {frames} {run.model} {run.model_path} -o evaluation")
     print(f"next: vm-detect --model {run.model_path} {_frames_to_try(run)} --save-overlay found")
     return EXIT_OK

@@ -24,7 +24,7 @@ from ..boxes.summary import rename_advice
 from ..formats.box_import import import_boxes
 from ..formats.box_masks import MaskRule
 from ..learning.configuration import TrainConfiguration
-from .box_options import add_box_options, parse_names
+from .box_options import add_box_options, divided_remark, parse_names
 from .training import load_start, read_configuration
 
 _NAMED = 40
@@ -63,7 +63,7 @@ def import_boxes_parser() -> argparse.ArgumentParser:
 
 def run_import_boxes(options: argparse.Namespace) -> int:
     """Import as the options say and return the exit status. Raises VisualMeshError, also if no frame can be used."""
-    from ..tuning.boxed_objects import split_by_recording
+    from ..tuning.boxed_objects import divided, hold_out
 
     configuration = read_configuration(options, load_start(options.start))
     rule = _rule(configuration, options.object_radius)
@@ -81,18 +81,15 @@ def run_import_boxes(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     used = [(each, name) for each, name in zip(found.pictures, result.numbers, strict=True) if name is not None]
-    split = split_by_recording([each for each, _ in used], configuration.data.validation, configuration.data.split_seed)
-    if split.validation:
-        _write_list(options.out / "validation.txt", [used[int(each)][1] for each in split.validation])
-    else:
-        print(
-            "vm-train: no recording is small enough to be kept for validation, so there is no validation.txt; record "
-            "several times",
-            file=sys.stderr,
-        )
+    frames = [each for each, _ in used]
+    validation = sorted(hold_out(frames, configuration.data.validation, configuration.data.split_seed))
+    if validation:
+        _write_list(options.out / "validation.txt", [used[each][1] for each in validation])
+    if divided(frames, validation):
+        _complain([divided_remark("validation")])
     left_out = len(found.pictures) - len(used)
     print(
-        f"{options.out}: {len(used)} pictures, {len(split.validation)} of them in validation.txt; "
+        f"{options.out}: {len(used)} pictures, {len(validation)} of them in validation.txt; "
         f"{result.labeled} boxes labeled, {len(result.misfits)} left unlabeled; "
         f"{left_out} frames without lens or pose left out"
     )

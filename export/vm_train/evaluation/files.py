@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import cv2
 
 from vm_embedded.borders.text import to_json
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_not_input, exists, read_regular, write_file
+from vm_embedded.output.result_files import make_folder
 from vm_workstation.plots import save_figure
 
 from .evaluation import Evaluation
@@ -20,8 +19,7 @@ from .point_plots import confusion, point_curves, points_over_distance
 from .proposal_plot import proposal_recalls
 from .report import page
 from .tables import as_csv, as_json
-from .worst_errors import WorstError
-from .worst_pictures import draw_error
+from .worst_pictures import error_strips
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,7 +30,6 @@ _PLOTS = (
     *("objects_curves", "objects_over_distance", "distance_error", "reliability", "proposals"),
 )
 _SCORES, _REPORT = "scores.json", "report.html"
-_QUALITY = 85  # of the small JPEG pictures
 
 
 def check_evaluation_folder(out: Path, inputs: Iterable[Path | None]) -> None:
@@ -83,14 +80,27 @@ def write_evaluation(
     for name, each in figures.items():
         save_figure(each, out / "plots" / f"{name}.svg")
     images = {name: (out / "plots" / f"{name}.svg").read_bytes() for name in figures}
-    texts[_REPORT] = page(scores, images, _strips(evaluation))
+    texts[_REPORT] = page(scores, images, error_strips(evaluation.worst))
     for file_name, text in texts.items():
         write_file(out / file_name, text)
-    for stale in {f"{name}.csv" for name in _TABLES}.difference(texts):
-        (out / stale).unlink(missing_ok=True)
-    for stale in set(_PLOTS).difference(figures):
-        (out / "plots" / f"{stale}.svg").unlink(missing_ok=True)
+    _remove_stale(out, texts, figures)
     return scores
+
+
+def write_box_evaluation(out: Path, scores: dict[str, Any], page: str) -> None:
+    """Write scores.json and report.html of frames with boxes, as `write_evaluation` does. scores: with `about`."""
+    make_folder(out)
+    write_file(out / _SCORES, to_json(scores, indent=1, allow_nan=False) + "\n")
+    write_file(out / _REPORT, page)
+    _remove_stale(out, (), ())
+
+
+def _remove_stale(out: Path, tables: Collection[str], plots: Collection[str]) -> None:
+    """Remove the tables and plots of an earlier evaluation that this one does not have."""
+    for stale in {f"{name}.csv" for name in _TABLES}.difference(tables):
+        (out / stale).unlink(missing_ok=True)
+    for stale in set(_PLOTS).difference(plots):
+        (out / "plots" / f"{stale}.svg").unlink(missing_ok=True)
 
 
 def _figures(evaluation: Evaluation, threshold: float) -> dict[str, Figure]:
@@ -109,24 +119,3 @@ def _figures(evaluation: Evaluation, threshold: float) -> dict[str, Figure]:
     if evaluation.proposals:
         figures["proposals"] = proposal_recalls(evaluation.proposals, objects)
     return figures
-
-
-def _strips(evaluation: Evaluation) -> Mapping[str, list[tuple[bytes, str]]]:
-    """The worst errors by heading: small JPEG pictures with their captions."""
-    worst = evaluation.worst
-    return {
-        "Missed objects, the largest first": [
-            (_jpeg(each), f"{_name(each)}: {each.class_name} of {each.rank:.1f} px") for each in worst.missed
-        ],
-        "False objects, the most confident first": [
-            (_jpeg(each), f"{_name(each)}: {each.class_name} {each.rank:.2f}") for each in worst.false
-        ],
-    }
-
-
-def _name(error: WorstError) -> str:
-    return error.files.image.name
-
-
-def _jpeg(error: WorstError) -> bytes:
-    return cv2.imencode(".jpg", draw_error(error), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()

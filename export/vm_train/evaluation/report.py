@@ -24,6 +24,7 @@ from .summary import (
     subject,
     tables_by_overlap,
 )
+from .worst_pictures import KEY
 
 CAPTIONS = {
     "objects_curves": "Objects: precision and false objects per picture, over recall. The curves end at the detector's "
@@ -50,8 +51,6 @@ _OBJECT_PLOTS = ("objects_curves", "objects_over_distance", "distance_error", "r
 
 _CENTER = "Center: angle between the rays to the true and the found center, over the object's apparent radius (r)."
 
-_KEY = '<p>Outlines: <b class="true">true</b>, <b class="found">found</b>.</p>'
-
 
 def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequence[tuple[bytes, str]]]) -> str:
     """The HTML text. plots: SVG by name, as in CAPTIONS. strips: by heading, JPEG pictures with their captions."""
@@ -76,7 +75,7 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
     parts.append(_plot("proposals", plots, about))
     for heading, pictures in strips.items():
         if pictures:
-            parts.append(f"<h2>{escape(heading)}</h2>{_KEY}{html_strip(pictures)}")
+            parts.append(f"<h2>{escape(heading)}</h2>{KEY}{html_strip(pictures)}")
     for name, each in field_tables(scores["field"]).items():
         parts.append(f"<h2>{escape(name[0].upper() + name[1:])}</h2>{html_table(*each)}")
     parts.append(f"<h2>Points</h2>{html_table(*point_table(scores['points']))}")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -23,11 +25,13 @@ MOST = 12
 class WorstError:
     """A picture with a missed or a false object.
 
-    rank: radius of the largest missed object [px], or confidence of the most confident false one. center (2,) and
-    radius [px]: of this object. true, found: outlines (m, 2) [px] of all objects of the class.
+    content: reads the bytes of the image file, which may be in a shard. rank: radius of the largest missed object, or
+    size of its box [px], or confidence of the most confident false one. center (2,) and radius [px]: of this object.
+    true, found: outlines (m, 2) [px] of all objects of the class.
     """
 
-    files: PictureFiles
+    image: Path
+    content: Callable[[], bytes]
     class_name: str
     rank: float
     center: Floats
@@ -58,6 +62,7 @@ def worst_errors_of(
     """The largest missed and the most confident false object of a picture. truths, found: all objects of the class."""
     if not mistakes.missed and not mistakes.false:
         return WorstErrors()
+    place = files.image, partial(files.read, "image")
     true_outlines = tuple(outline for each in truths for outline in _outlines(each.mask))
     found_outlines = tuple(each.outline for each in found)
     missed, false = [], []
@@ -67,16 +72,16 @@ def worst_errors_of(
         center = np.array([columns.mean(), rows.mean()]) if len(rows) else np.zeros(2)
         # Of the part inside the picture: the whole outline may be endless.
         radius = float(np.sqrt(largest.mask.sum(dtype=np.float64) / np.pi))
-        missed.append(WorstError(files, class_name, radius, center, radius, true_outlines, found_outlines))
+        missed.append(WorstError(*place, class_name, radius, center, radius, true_outlines, found_outlines))
     if mistakes.false:
         worst = mistakes.false[0]
         rank, center = worst.confidence, worst.center
-        false.append(WorstError(files, class_name, rank, center, worst.radius, true_outlines, found_outlines))
+        false.append(WorstError(*place, class_name, rank, center, worst.radius, true_outlines, found_outlines))
     return WorstErrors(tuple(missed), tuple(false))
 
 
 def _worst(errors: Sequence[WorstError]) -> tuple[WorstError, ...]:
-    return tuple(sorted(errors, key=lambda each: (-each.rank, str(each.files.image)))[:MOST])
+    return tuple(sorted(errors, key=lambda each: (-each.rank, str(each.image)))[:MOST])
 
 
 def _outlines(mask: Mask | Singles) -> list[Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -12,20 +12,38 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.cameras.decoding import decode
 
-from .worst_errors import WorstError
+from .worst_errors import WorstError, WorstErrors
 
 TRUE, FOUND = (120, 255, 60), (255, 60, 255)
 """BGR colors of true and found outlines."""
 
+KEY = '<p>Outlines: <b class="true">true</b>, <b class="found">found</b>.</p>'
+"""What their colors mean, for a page."""
+
 _HEIGHT = 200  # of the small picture [px]
 _AROUND = 4.0  # radii to show around the object
 _LEAST = 24.0  # px to show around the object at least, so that people recognize it
+_QUALITY = 85  # of the small JPEG pictures
 _ROUND = 4  # fractional bits of corners in OpenCV
+
+
+def error_strips(worst: WorstErrors) -> Mapping[str, list[tuple[bytes, str]]]:
+    """The worst errors by heading: small JPEG pictures with their captions."""
+    return {
+        "Missed objects, the largest first": list(_captioned(worst.missed, "of {:.1f} px")),
+        "False objects, the most confident first": list(_captioned(worst.false, "{:.2f}")),
+    }
+
+
+def _captioned(errors: Iterable[WorstError], rank: str) -> Iterable[tuple[bytes, str]]:
+    for each in errors:
+        jpeg = cv2.imencode(".jpg", draw_error(each), [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+        yield jpeg, f"{each.image.name}: {each.class_name} {rank.format(each.rank)}"
 
 
 def draw_error(error: WorstError) -> Image:
     """The picture (200, w, 3) with all outlines. Raises InputError if the image can no longer be read."""
-    image = decode(error.files.read("image"))
+    image = decode(error.content())
     height, width = image.shape[:2]
     scale = _HEIGHT / height
     whole = np.array([[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5]])

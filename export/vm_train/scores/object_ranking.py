@@ -55,21 +55,16 @@ class ObjectOutcome(Outcome):
         return ratio(self.false, self.pictures)
 
 
-@dataclass(frozen=True, eq=False)
-class ObjectRanking:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ranking:
     """The found objects that count, at one overlap.
 
-    confidence (m,). right (m,): whether it matches a true object. true_distance, found_distance, place_error (m,) [m].
-    center_error (m,) [apparent radii]. True distance and errors of false objects are NaN. truths: number of true
-    objects that count. pictures: number of all pictures, whatever the distance.
+    confidence (m,). right (m,): whether it matches a true object. truths: number of true objects that count. pictures:
+    number of all pictures.
     """
 
     confidence: Floats
     right: Mask
-    true_distance: Floats
-    found_distance: Floats
-    place_error: Floats
-    center_error: Floats
     truths: int
     pictures: int
 
@@ -95,6 +90,18 @@ class ObjectRanking:
         reported = self.confidence >= confidence
         hits = int((self.right & reported).sum())
         return ObjectOutcome(hits, int(reported.sum()) - hits, self.truths - hits, self.pictures)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ObjectRanking(Ranking):
+    """The same with errors of place: true_distance, found_distance, place_error (m,) [m], center_error (m,) [apparent
+    radii]. True distance and errors of false objects are NaN. pictures: whatever the distance.
+    """
+
+    true_distance: Floats
+    found_distance: Floats
+    place_error: Floats
+    center_error: Floats
 
     def errors(self, confidence: float = 0.0) -> Errors:
         """Errors of the correctly found objects of at least this confidence whose true position is known."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
 from vm_embedded.detection.looking import Look, chain_of, look_at
+from vm_embedded.detection.peaks import LARGEST_SIZE
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
 
@@ -44,23 +46,33 @@ def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, abo
     likely = np.flatnonzero((answers[:, 0] > above) & (np.abs(answers[:, 3]) < _UNLIKE))
     likely = likely[np.argsort(-answers[likely, 0], kind="stable")]
     found = windows.part(likely).moved(answers[likely, 1], answers[likely, 2])
-    return _without_overlaps(found, most)
+    return found.part(_apart(found, most))
 
 
-def look_at_windows(pyramid: Pyramid, look: Look, windows: Windows) -> tuple[Windows, Floats]:
-    """The windows where the network sees an object after all its looks, and its probabilities (n,)."""
-    places = WindowPlaces(pyramid, windows)
-    answers = look_at(places, look)
-    return places.windows, answers[:, 0].astype(np.float64)
+def seen_objects(
+    pyramid: Pyramid, size: Size, look: Look, radii: Floats, above: float, most: int
+) -> tuple[Windows, Floats]:
+    """The objects that a network sees at its candidates after all its looks, the most probable first, each once.
+
+    Their places and sizes are those that it sees. Also returns its probabilities (n,). Arguments and errors: see
+    `find_candidates`.
+    """
+    places = WindowPlaces(pyramid, find_candidates(pyramid, size, look, radii, above, most))
+    answers = look_at(places, look).astype(np.float64)
+    order = np.argsort(-answers[:, 0], kind="stable")
+    scale = np.exp(np.clip(answers[:, 3], -LARGEST_SIZE, LARGEST_SIZE))
+    seen = Windows(places.windows.centers, places.windows.radii * scale).part(order)
+    kept = _apart(seen, most)
+    return seen.part(kept), answers[order[kept], 0]
 
 
-def _without_overlaps(windows: Windows, most: int) -> Windows:
-    """The first windows of which none contains the center of an earlier one, and none is contained in this way."""
-    kept = Windows.none()
+def _apart(windows: Windows, most: int) -> npt.NDArray[np.intp]:
+    """Numbers of the first windows of which none contains the center of an earlier one, and none is contained in this
+    way; at most `most`."""
+    kept: list[int] = []
     for number in range(len(windows)):
-        each = windows.part(np.array([number]))
-        if each.beside(kept)[0]:
-            kept = Windows.joined(kept, each)
+        if windows.part(np.array([number])).beside(windows.part(np.array(kept, dtype=np.intp)))[0]:
+            kept.append(number)
             if len(kept) == most:
                 break
-    return kept
+    return np.array(kept, dtype=np.intp)

@@ -17,6 +17,11 @@ class TuningData:
     validation: float = share(
         0.15, "share of the pictures for validation; a recording is either all for training or all for validation"
     )
+    test: float = share(
+        0.15,
+        "share of the pictures for the test, which measures the result; whole recordings, or the last third of each "
+        "recording if all are too large",
+    )
     split_seed: int = number(0, "seed of the split", "", (0, 2**31))
 
     def __post_init__(self) -> None:

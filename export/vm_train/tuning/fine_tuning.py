@@ -9,20 +9,20 @@ from dataclasses import replace
 from vm_embedded import __version__
 from vm_embedded.borders.text import printable
 from vm_embedded.cli.progress import ProgressBar
+from vm_embedded.detection.settings import Settings
 from vm_embedded.files import write_file
-from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.model_file import read_model
 from vm_export.attach_look import attached
 from vm_export.look_checkpoint import LookCheckpoint
 
+from ..evaluation.box_report import box_page, found_of
 from ..look.patch_set import PatchSet
+from .box_finding import LOOK_ALONE, Search, Trial
+from .boxed_objects import divided
 from .collection import collect_windows
 from .rendered_patches import read_rendered
-from .report import REPORT, write_report
-from .run_folder import TuningRun
+from .run_folder import REPORT, TuningRun
 from .stage_training import StagePatches, train_stage
 from .stages import LOOK, network_before, stages_of
-from .window_scores import WindowScores, score_frames
 
 
 def fine_tune(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) -> bool:
@@ -47,7 +47,8 @@ def fine_tune(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) 
             before = replace(before, contract=replace(before.contract, provenance=_provenance(run, before, own)))
         replace(before, network=network).save(run.stage_path(stage))
         run.state_path.unlink(missing_ok=True)
-    return _finish(run, stop_requested)
+    _finish(run, workers, stop_requested)
+    return True
 
 
 def _collect(run: TuningRun, stage: str, workers: int, stop_requested: Callable[[], bool]) -> PatchSet:
@@ -77,30 +78,50 @@ def _provenance(run: TuningRun, before: LookCheckpoint, own: PatchSet) -> Mappin
     }
 
 
-def _finish(run: TuningRun, stop_requested: Callable[[], bool]) -> bool:
-    """Write the model file and the report. Returns False after a stop."""
+def _finish(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) -> None:
+    """Write the model file and the report. Raises KeyboardInterrupt for a stop."""
     look = LookCheckpoint.load(run.stage_path(LOOK))
     content, _ = attached(run.before.content, run.before.manifest, look)
     write_file(run.model_path, content)
-    frames = run.part(run.split.validation)
-    scores: list[WindowScores] = []
+    frames = run.part(run.held_out)
     bar = ProgressBar(2 * len(frames), "vm-train")
-    for model in (run.before, read_model(run.model_path)):
-        judge = CloseLook.of(model)
-        assert judge is not None
-        score = score_frames(judge, frames, run.object_class, run.is_round, run.radii, bar.advance, stop_requested)
-        if score is None:
-            bar.clear()
-            return False
-        scores.append(score)
-    bar.clear()
-    before, after = scores
-    both = {"before": before.as_dict(), "after": after.as_dict()}
-    write_file(run.folder / "result.json", json.dumps(both, indent=1) + "\n")
-    write_report(run, before, after)
-    if frames:
-        print(f"{run.model_path}: in {len(frames)} frames for validation, it finds {after.found_of()}")
-        print(f"before the fine-tuning: {before.found_of()}")
+
+    def report() -> None:
+        bar.advance()
+        if stop_requested():
+            raise KeyboardInterrupt
+
+    search = Search.of(run.pictures, run.object_class, run.is_round)
+    models = {"before": run.before.path, "after": run.model_path}
+    try:
+        scores = [
+            Trial(name, path, Settings(), search).scores(frames, run.object_class, workers, report)
+            for name, path in models.items()
+        ]
+    finally:
+        bar.clear()
+    tables = {each.name: each.as_dict() for each in scores}
+    write_file(run.folder / "result.json", json.dumps(tables, indent=1) + "\n")
+    write_file(run.folder / REPORT, box_page(f"{run.boxes.folder.name}: {run.object_class}", _about(run), scores))
+    if not frames:
+        print(f"{run.model_path}: not measured, because no frames were held out")
+        return
+    part = "the test" if run.split.test else "validation"
+    print(f"{run.model_path}: in {len(frames)} frames for {part}, it finds {found_of(scores[1])}")
+    print(f"before the fine-tuning: {found_of(scores[0])}")
+
+
+def _about(run: TuningRun) -> list[str]:
+    """What the report measures."""
+    learned = f"The close look of {run.model} learned from {len(run.split.training)} frames of {run.boxes.folder.name}."
+    frames = run.part(run.held_out)
+    if not frames:
+        return [learned, "No other frames were held out, so nothing was measured."]
+    if divided(run.pictures, map(int, run.held_out)):
+        others = f"{len(frames)} later frames of the same recordings"
     else:
-        print(f"{run.model_path}: not measured, because no frames are for validation")
-    return True
+        others = f"{len(frames)} frames of other recordings"
+    measured = f"{learned} These scores are of {others}."
+    if not run.split.test:
+        measured += " They chose the best epoch, so the scores after it may be a little too good."
+    return [measured, LOOK_ALONE]

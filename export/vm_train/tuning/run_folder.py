@@ -3,7 +3,7 @@
 tune.toml: the configuration. run.json: where the boxes are. before.onnx: the model file that it began with.
 rendered.npz: rendered patches. patches/: patches of the user's frames. glance.pt, look.pt: the networks, when they are
 trained. state.pt: the state to resume from. log-glance/, log-look/: the records of each step. model.onnx: the new model
-file. report.html, result.json: what both networks find in the frames for validation.
+file. pictures.json: the frames of each part. report.html, result.json: what both networks find in the held-out frames.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
-from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.output.result_files import make_folder
@@ -30,15 +29,19 @@ from vm_export.look_weights import look_of
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
-from ..data.split import Split
+from ..data.split import Split, write_split
 from ..learning.folder_access import check_unused, description
-from .boxed_objects import all_objects, boxes_sha256, check_boxes, split_by_recording
+from .boxed_objects import all_objects, boxes_sha256, check_boxes, is_round, split_by_recording
 from .candidates import search_radii
 from .configuration import TuningConfiguration
 from .rendered_sample import check_rendered, write_rendered_for
 
 KIND = "tuning"
-_FORMAT = 1
+
+REPORT = "report.html"
+"""Name of the report, the last file that a fine-tuning writes."""
+
+_FORMAT = 2
 _FILES = (
     "tune.toml",
     "before.onnx",
@@ -48,8 +51,9 @@ _FILES = (
     "glance.pt",
     "look.pt",
     "model.onnx",
-    "report.html",
+    REPORT,
     "result.json",
+    "pictures.json",
 )
 """Files that a new fine-tuning would overwrite."""
 
@@ -96,6 +100,16 @@ class TuningRun:
         return self.folder / "rendered.npz"
 
     @property
+    def split_path(self) -> Path:
+        """The list of the frames of each part, for vm-evaluate --boxes --list."""
+        return self.folder / "pictures.json"
+
+    @property
+    def held_out(self) -> tuple[str, ...]:
+        """The frames that measure the result: those for the test, or, if there are none, those for validation."""
+        return self.split.test or self.split.validation
+
+    @property
     def model_path(self) -> Path:
         """The new model file."""
         return self.folder / "model.onnx"
@@ -119,7 +133,7 @@ class TuningRun:
     @property
     def is_round(self) -> bool:
         """Whether the objects look round from everywhere."""
-        return isinstance(self.before.manifest.object_shape, Sphere)
+        return is_round(self.before.manifest)
 
     def part(self, numbers: Sequence[str]) -> list[BoxedPicture]:
         """The frames with these positions, as text."""
@@ -162,13 +176,16 @@ def begin_tuning(
     look = tuned_look(before)
     check_boxes(found, look.contract.object_class, str(boxes.folder))
     check_rendered(look.contract, rendered)
-    split = split_by_recording(found.pictures, configuration.data.validation, configuration.data.split_seed)
+    split = _split(found.pictures, configuration)
     run = TuningRun(folder, boxes, name, before, found.pictures, split, configuration, threads)
     for_training = BoxedSet(tuple(run.part(split.training)), (), ())
     check_boxes(for_training, look.contract.object_class, f"{boxes.folder}, part for training,")
     make_folder(folder / "patches")
     write_file(folder / "before.onnx", before.content)
     write_rendered_for(run.rendered_path, rendered)
+    names = [each.image.relative_to(boxes.folder).as_posix() for each in found.pictures]
+    parts = (tuple(names[int(each)] for each in part) for part in (split.training, split.validation, split.test))
+    write_split(run.split_path, Split(*parts))
     write_file(folder / "tune.toml", to_commented_toml(configuration))
     write_file(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
     return run
@@ -183,7 +200,7 @@ def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
         digests = str(content["boxes_sha256"]), str(content["configuration_sha256"]), str(content["before_sha256"])
     configuration = read_sections(TuningConfiguration, folder / "tune.toml")
     pictures = boxes.read().pictures
-    split = split_by_recording(pictures, configuration.data.validation, configuration.data.split_seed)
+    split = _split(pictures, configuration)
     before = read_model(folder / "before.onnx")
     run = TuningRun(folder, boxes, model, before, pictures, split, configuration, threads)
     present = boxes_sha256(pictures), _configuration_sha256(configuration), before.sha256
@@ -193,6 +210,11 @@ def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
                 f"{what} was changed since the fine-tuning began: undo the change, or begin another one in a new folder"
             )
     return run
+
+
+def _split(pictures: Sequence[BoxedPicture], configuration: TuningConfiguration) -> Split:
+    data = configuration.data
+    return split_by_recording(pictures, data.validation, data.test, data.split_seed)
 
 
 def _description(run: TuningRun) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from vm_embedded.detection.pyramid import Pyramid
 from ..boxes.box import Box, BoxedPicture
 from ..boxes.unlabeled import Sighting
 from .boxed_objects import all_objects
-from .candidates import find_candidates, look_at_windows, search_radii
+from .candidates import search_radii, seen_objects
 
 CLEAR = 0.95
 """Probability from which a sighting is clear."""
@@ -33,8 +33,7 @@ def clear_sightings(
     radii = search_radii(objects)
     for picture in pictures:
         pyramid = Pyramid(read_image(picture.image), "bgr")
-        candidates = find_candidates(pyramid, picture.size, look, radii, _ABOVE, _CANDIDATES)
-        windows, probabilities = look_at_windows(pyramid, look, candidates)
+        windows, probabilities = seen_objects(pyramid, picture.size, look, radii, _ABOVE, _CANDIDATES)
         for (x, y), radius, probability in zip(windows.centers, windows.radii, probabilities, strict=True):
             if probability >= CLEAR:
                 box = Box(name, x - radius, y - radius, x + radius, y + radius)

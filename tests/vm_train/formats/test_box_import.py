@@ -79,7 +79,9 @@ def test_masks_from_true_boxes_agree_with_the_true_masks(frames, configuration, 
     said = capsys.readouterr()
     assert f"{out}: 40 pictures, " in said.out
     assert f"{boxes} boxes labeled, 0 left unlabeled; 0 frames without lens or pose left out" in said.out
-    assert said.err.startswith("vm-train: no recording is small enough to be kept for validation")
+    assert said.err.startswith("vm-train: no recording is small enough to be held out as a whole")
+    listed = (out / "validation.txt").read_text().split()
+    assert listed == sorted(image.stem for image in folder.glob("*.jpg"))[-13:]  # the last third of the recording
     assert said.err.count("\n") == 1
     known = wrong = balls = found = 0
     for image in folder.glob("*.jpg"):

@@ -9,6 +9,7 @@ from ..drawn import draw_set
 TINY = """
 [data]
 validation = 0.3
+test = 0.3
 [patches]
 jittered = 2
 random = 3

@@ -1,5 +1,6 @@
 """Objects in boxed frames, and the split by recording."""
 
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,14 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
 from vm_train.boxes.box import Box, BoxedPicture, BoxedSet
-from vm_train.tuning.boxed_objects import boxes_sha256, check_boxes, objects_of, split_by_recording
+from vm_train.tuning.boxed_objects import (
+    boxes_sha256,
+    check_boxes,
+    divided,
+    hold_out,
+    objects_of,
+    split_by_recording,
+)
 
 SIZE = (200, 150)
 
@@ -42,21 +50,49 @@ def test_a_ball_that_the_border_cuts_is_completed(x, y, radius):
 @given(
     st.lists(st.sampled_from("abcdefgh"), min_size=1, max_size=60),
     st.floats(0.0, 0.5),
+    st.floats(0.0, 0.5),
     st.integers(0, 100),
 )
-def test_a_recording_is_in_one_part_and_validation_does_not_get_too_large(recordings, share, seed):
+def test_a_recording_is_in_one_part_or_divided_in_time(recordings, share, test, seed):
     pictures = [picture(recording=each, name=f"{number}.jpg") for number, each in enumerate(recordings)]
-    split = split_by_recording(pictures, share, seed)
-    parts = [{recordings[int(each)] for each in part} for part in (split.training, split.validation)]
-    assert not parts[0] & parts[1]
-    assert sorted(map(int, (*split.training, *split.validation))) == list(range(len(pictures)))
+    split = split_by_recording(pictures, share, test, seed)
+    numbers = [[int(each) for each in part] for part in (split.training, split.validation, split.test)]
+    assert sorted(chain(*numbers)) == list(range(len(pictures)))
+    assert split == split_by_recording(pictures, share, test, seed)
+    training, validation, tested = ({recordings[each] for each in part} for part in numbers)
+    assert divided(pictures, numbers[2]) == bool(tested & (training | validation))
+    if divided(pictures, numbers[2]):
+        assert not validation
+        for each in tested & training:
+            frames = [at for at, recording in enumerate(recordings) if recording == each]
+            assert frames[-round(len(frames) / 3) :] == [at for at in numbers[2] if recordings[at] == each]
+    else:
+        assert not training & (validation | tested)
+        assert not validation & tested
+        assert len(split.test) <= 1.5 * test * len(pictures)
     assert len(split.validation) <= 1.5 * share * len(pictures)
-    assert split == split_by_recording(pictures, share, seed)
 
 
-def test_many_small_recordings_give_about_the_share_that_was_asked_for():
+def test_many_small_recordings_give_about_the_shares_that_were_asked_for():
     pictures = [picture(recording=str(number // 3)) for number in range(300)]
-    assert len(split_by_recording(pictures, 0.2, 0).validation) == pytest.approx(60, abs=3)
+    split = split_by_recording(pictures, 0.2, 0.1, 0)
+    assert len(split.validation) == pytest.approx(60, abs=3)
+    assert len(split.test) == pytest.approx(30, abs=3)
+
+
+@pytest.mark.parametrize("names", ["film-{}.jpg", "{}.png", "day/image{:05d}.jpg"])
+def test_of_a_single_recording_the_last_third_in_time_is_held_out(names):
+    """Also if the files are listed as text sorts them: frame 10 comes after frame 9."""
+    order = sorted(range(40), key=str)
+    pictures = [picture(name=names.format(frame)) for frame in order]
+    assert {order[at] for at in hold_out(pictures, 0.15, 0)} == set(range(27, 40))
+    assert divided(pictures, hold_out(pictures, 0.15, 0))
+    assert hold_out(pictures, 0.0, 0) == set()
+
+
+def test_of_two_equal_recordings_the_last_thirds_are_held_out():
+    pictures = [picture(recording=each, name=f"{each}{frame}.jpg") for each in "ab" for frame in range(20)]
+    assert hold_out(pictures, 0.15, 0) == {*range(13, 20), *range(33, 40)}
 
 
 def test_a_class_without_boxes_tells_which_there_are():

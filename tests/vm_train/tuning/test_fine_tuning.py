@@ -42,7 +42,7 @@ def whole(tune, tmp_path_factory):
 def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
     folder, done = whole
     lines = done.stdout.splitlines()
-    assert lines[0] == f"{frames}: 12 frames of 3 recordings: 8 for training, 4 for validation"
+    assert lines[0] == f"{frames}: 12 frames of 3 recordings: 4 for training, 4 for validation, 4 for the test"
     for start, stage in ((1, "glance"), (4, "look")):
         assert re.fullmatch(rf"{stage}: \d+ patches of your frames, \d+ of them show the object", lines[start])
         for epoch in (1, 2):
@@ -51,22 +51,28 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
                 r"with \d+0% of the new weights; loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
                 lines[start + epoch],
             )
-    assert re.search(r"model.onnx: in 4 frames for validation, it finds \d+ of \d+ boxes and \d+ false", lines[7])
+    assert re.search(r"model.onnx: in 4 frames for the test, it finds \d+ of \d+ boxes and \d+ false", lines[7])
     assert lines[9:] == [
         f"report: {folder / 'report.html'}",
+        f"next: vm-evaluate --boxes {frames} --names 0=ball --list {folder / 'pictures.json'} ball-small "
+        f"{folder / 'model.onnx'} -o evaluation",
         f"next: vm-detect --model {folder / 'model.onnx'} FRAMES --lens LENS.yaml --height METERS --pitch ANGLE "
         "--save-overlay found",
     ]
     assert "with fewer than 25 frames for training" in done.stderr
     assert {path.name for path in folder.iterdir()} == {
         *("tune.toml", "run.json", "before.onnx", "rendered.npz", "patches", "glance.pt", "look.pt"),
-        *("log-glance", "log-look", "model.onnx", "report.html", "result.json"),
+        *("log-glance", "log-look", "model.onnx", "report.html", "result.json", "pictures.json"),
     }
     result = json.loads((folder / "result.json").read_text())
-    assert result["before"]["boxes"] == result["after"]["boxes"] > 0
+    assert result["before"]["all"]["boxes"] == result["after"]["all"]["boxes"] > 0
     page = (folder / "report.html").read_text()
-    assert "8 frames" in page
-    assert "4 other frames" in page
+    assert "learned from 4 frames" in page
+    assert "4 frames of other recordings" in page
+    parts = json.loads((folder / "pictures.json").read_text())
+    names = [{name[0] for name in parts[part]} for part in ("training", "validation", "test")]
+    assert sorted(map(len, names)) == [1, 1, 1]
+    assert set.union(*names) == set("abc")
 
 
 def test_the_new_model_differs_only_in_its_close_look(whole):
@@ -77,28 +83,27 @@ def test_the_new_model_differs_only_in_its_close_look(whole):
     for new, old in zip(after.look, before.look, strict=True):
         assert new != old
     provenance = after.manifest.look.provenance
-    assert provenance["fine_tuned_frames"] == "8"
+    assert provenance["fine_tuned_frames"] == "4"
     assert provenance["fine_tuned_from_sha256"] == before.sha256
     assert provenance["data"] == before.manifest.look.provenance["data"]
     assert CloseLook.of(after).glance is not None  # loads, and passes its self-tests
 
 
-def test_frames_without_validation_measure_nothing_and_those_with_lenses_can_be_tried(tune, frames, tmp_path):
+def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_be_tried(tune, frames, tmp_path):
     seen = shutil.copytree(frames, tmp_path / "seen")
     lens = draw_set(tmp_path / "drawn", 1) / "lens0000.yaml"
     for image in seen.glob("*.jpg"):
         shutil.copy(lens, image.with_suffix(".yaml"))
-    done = tune(tmp_path / "run", "--boxes", seen, "--set", "data.validation=0")
+    done = tune(tmp_path / "run", "--boxes", seen, "--set", "data.validation=0", "--set", "data.test=0")
     lines = done.stdout.splitlines()
     assert re.match(r"glance, epoch 1 of 2: validation loss [\d.]+ for rendered patches, with ", lines[2])
     model = tmp_path / "run" / "model.onnx"
     assert lines[7:] == [
-        f"{model}: not measured, because no frames are for validation",
+        f"{model}: not measured, because no frames were held out",
         f"report: {tmp_path / 'run' / 'report.html'}",
         f"next: vm-detect --model {model} {seen} --save-overlay found",
     ]
-    assert "put the frames of each recording into a folder of its own" in done.stderr
-    assert "0 other frames" not in (tmp_path / "run" / "report.html").read_text()
+    assert "nothing was measured" in (tmp_path / "run" / "report.html").read_text()
 
 
 @pytest.mark.long
@@ -193,16 +198,16 @@ def test_mistakes_are_told_in_one_line(complaint, frames, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_boxes_that_are_only_in_the_validation_leave_nothing(complaint, frames, tmp_path):
+def test_boxes_that_are_only_in_the_test_leave_nothing(complaint, frames, tmp_path):
     folder = tmp_path / "boxes"
     shutil.copytree(frames, folder)
     for each in folder.glob("*.txt"):
         if each.name[0] != "b":
             each.write_text("")
     pictures = read_boxes(folder, None, {"0": "ball"}).pictures
-    splits = {seed: split_by_recording(pictures, 0.3, seed).validation for seed in range(99)}
+    splits = {seed: split_by_recording(pictures, 0.3, 0.3, seed).test for seed in range(99)}
     seed = next(seed for seed, taken in splits.items() if pictures[int(taken[0])].image.name[0] == "b")
-    options = ("--names", "0=ball", "--set", f"data.split_seed={seed}", "--set", "data.validation=0.3")
+    options = ("--names", "0=ball", "--set", f"data.split_seed={seed}", "--set", "data.test=0.3")
     assert "part for training, has no box" in complaint("--from", "ball-small", "--boxes", folder, *options)
     assert not (tmp_path / "run").exists()
 

@@ -9,7 +9,7 @@ from vm_embedded.detection.looking import look_at
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.network.look_contract import LookContract
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED
-from vm_train.tuning.candidates import find_candidates, look_at_windows, search_radii
+from vm_train.tuning.candidates import find_candidates, search_radii, seen_objects
 from vm_train.tuning.windows import WindowPlaces, Windows, grid_windows, jittered_windows, random_windows
 
 CONTRACT = LookContract(object_class="ball", size=16, extent=2.0, above=0.03, passes=1)
@@ -119,14 +119,22 @@ def test_sizes_to_look_for_cover_those_of_the_objects(rows):
 def test_the_network_finds_each_disk_once_wherever_it_is():
     true = windows((40.3, 60.0, 10.0), (150.0, 35.5, 14.0))
     pyramid = disks((40.3, 60.0, 10.0), (150.0, 35.5, 14.0))
-    found = find_candidates(pyramid, (200, 150), Bright(), np.array([7.0, 10.0, 14.0]), 0.1, 10)
-    moved, probabilities = look_at_windows(pyramid, Bright(passes=2), found)
-    assert len(found) == 2
+    seen, probabilities = seen_objects(pyramid, (200, 150), Bright(passes=2), np.array([7.0, 10.0, 14.0]), 0.1, 10)
+    assert len(seen) == 2
     assert (probabilities > 0.8).all()
-    order = np.argsort(moved.centers[:, 0])
-    np.testing.assert_allclose(moved.centers[order], true.centers, atol=0.5)
+    assert (np.diff(probabilities) <= 0.0).all()
+    order = np.argsort(seen.centers[:, 0])
+    np.testing.assert_allclose(seen.centers[order], true.centers, atol=0.5)
     assert len(find_candidates(pyramid, (200, 150), Bright(), np.array([10.0, 14.0]), 0.1, 1)) == 1
     assert len(find_candidates(disks(), (200, 150), Bright(), np.array([10.0]), 0.1, 10)) == 0
+
+
+@pytest.mark.parametrize("radius", [9.0, 10.5, 12.0])
+def test_an_object_has_the_size_that_the_network_sees(radius):
+    """Not that of the window: the sizes that it looks for are far apart."""
+    pyramid = disks((80.0, 60.0, radius))
+    seen, _ = seen_objects(pyramid, (200, 150), Bright(passes=2), np.array([10.0]), 0.1, 10)
+    assert seen.radii == pytest.approx([radius], rel=0.06)
 
 
 def test_the_first_of_all_glances_finds_the_candidates():

@@ -10,14 +10,13 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import read_image
-from vm_embedded.detection.looking import Look
+from vm_embedded.detection.looking import Look, look_at
 from vm_embedded.detection.pyramid import Pyramid
-
-from ..boxes.box import BoxedPicture
-from ..look.collection import random_of
-from .boxed_objects import objects_of
-from .candidates import find_candidates, look_at_windows
-from .windows import Windows, random_windows
+from vm_train.boxes.box import BoxedPicture
+from vm_train.look.collection import random_of
+from vm_train.tuning.boxed_objects import objects_of
+from vm_train.tuning.candidates import find_candidates
+from vm_train.tuning.windows import WindowPlaces, Windows, random_windows
 
 REPORTED = 0.5
 """Probability from which a detector reports an object, unless its settings say another one."""
@@ -79,11 +78,6 @@ class WindowScores:
         """Number of other places that a detector reports."""
         return int((self.others.probabilities >= REPORTED).sum())
 
-    def found_of(self) -> str:
-        """The counts as text."""
-        false = f"{self.false} false object{'s' * (self.false != 1)}"
-        return f"{self.reported} of {len(self.boxes.probabilities)} boxes and {false}"
-
     def as_dict(self) -> dict[str, float | int | None]:
         """Plain values for JSON; None for what has no value."""
         values = {"threshold": self.threshold, "recall": self.recall}
@@ -103,9 +97,8 @@ def score_frames(
     is_round: bool,
     radii: Floats,
     report: Callable[[], None],
-    stop_requested: Callable[[], bool] = lambda: False,
-) -> WindowScores | None:
-    """The scores of a network on frames; None after a stop.
+) -> WindowScores:
+    """The scores of a network on frames.
 
     radii (s,): of the objects to look for [px]. report: is called after each frame. Raises InputError for a frame that
     can't be read, and ModelError.
@@ -113,8 +106,6 @@ def score_frames(
     boxes: list[Looked] = []
     others: list[Looked] = []
     for number, frame in enumerate(frames):
-        if stop_requested():
-            return None
         pyramid = Pyramid(read_image(frame.image), "bgr")
         objects = objects_of(frame, object_class, is_round)
         somewhere = random_windows(frame.size, radii, _RANDOM, random_of(0, frame.image.name))
@@ -128,8 +119,9 @@ def score_frames(
 
 
 def _looked(pyramid: Pyramid, look: Look, windows: Windows, number: int) -> Looked:
-    moved, probabilities = look_at_windows(pyramid, look, windows)
-    return Looked(moved, np.full(len(moved), number, dtype=np.intp), probabilities)
+    places = WindowPlaces(pyramid, windows)
+    answers = look_at(places, look)
+    return Looked(places.windows, np.full(len(windows), number, dtype=np.intp), answers[:, 0].astype(np.float64))
 
 
 def _share(right: npt.NDArray[np.bool_]) -> float:
