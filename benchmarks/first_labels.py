@@ -3,7 +3,7 @@
     python -m benchmarks.first_labels ../shared/boxes -o work
 
 It finds balls in recordings, answers the page of vm-label as a person would who knows the true boxes, fine-tunes,
-exports, and scores the networks on the test part, and on the frames of other years in `test`. Needs no lens files: the
+exports, and scores the networks on the test part, and on the frames of other days in `test`. Needs no lens files: the
 cameras are of one kind, and their lens was estimated from the boxes of balls on the floor.
 """
 
