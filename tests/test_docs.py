@@ -108,7 +108,7 @@ def test_the_training_of_the_readme_uses_the_radii_of_its_pictures():
     """vm-synth draws balls of several radii, so that one radius for all pictures would be wrong."""
     low, high = SceneConfiguration().ball.radius
     assert low < high
-    commands = [line for line in shell_lines(README) if line.startswith(("vm-train data", "vm-evaluate "))]
+    commands = [line for line in shell_lines(README) if line.startswith(("vm-train data", "vm-evaluate runs"))]
     assert len(commands) == 2
     assert "--set mesh.radius_of=scene" in commands[0]
     assert "--radius-of scene" in commands[1]

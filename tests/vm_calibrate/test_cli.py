@@ -3,12 +3,12 @@
 import json
 import os
 import subprocess
-import sys
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from tests.programs import BIN
 from vm_calibrate.boards import DICTIONARIES, board_from
 from vm_calibrate.cli import LENS_NAMES
 from vm_calibrate.lens_kinds import LENS_KINDS
@@ -20,7 +20,7 @@ from .test_kalibr import CAMCHAIN
 
 def call(*arguments, **variables):
     return subprocess.run(
-        [sys.executable, "-m", "vm_calibrate", *arguments], capture_output=True, text=True, env=os.environ | variables
+        [BIN / "vm-calibrate", *arguments], capture_output=True, text=True, env=os.environ | variables
     )
 
 

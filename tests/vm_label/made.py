@@ -3,15 +3,15 @@
 import json
 import re
 import subprocess
-import sys
 from contextlib import contextmanager
 
 import cv2
 import numpy as np
 
 from tests.preloaded import run_preloaded
+from tests.programs import BIN
 
-COMMAND = [sys.executable, "-m", "vm_label"]
+COMMAND = [str(BIN / "vm-label")]
 SIZE = 160, 120
 
 
@@ -37,7 +37,7 @@ def make_folder(folder, count, near=True, classes=("ball",)):
 
 
 def run(*arguments, code=0, **more):
-    done = run_preloaded(["-m", "vm_label", *arguments], **more)
+    done = run_preloaded([*COMMAND, *arguments], **more)
     assert done.returncode == code, (done.returncode, done.stderr)
     assert "Traceback" not in done.stderr
     return done

@@ -3,7 +3,6 @@
 import json
 import re
 import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.programs import run_main
+from tests.programs import BIN, run_main
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.bundled import DEFAULT, model_path
@@ -26,7 +25,7 @@ run = partial(run_main, main)
 
 def test_help_and_unknown_commands_as_a_process():
     def call(*arguments):
-        return subprocess.run([sys.executable, "-m", "vm_mesh", *arguments], capture_output=True, text=True)
+        return subprocess.run([BIN / "vm-mesh", *arguments], capture_output=True, text=True)
 
     listed = call("--help")
     assert listed.returncode == 0

@@ -162,7 +162,7 @@ def test_parts_add_up_in_any_number_of_processes(files):
     assert as_csv(alone, 0.5) == as_csv(shared, 0.5)
     assert [each.files.number for each in alone.poses] == [f"{number:04d}" for number in range(10)]
     for one, other in zip(alone.worst.missed, shared.worst.missed, strict=True):
-        assert (one.files, one.rank) == (other.files, other.rank)
+        assert (one.image, one.rank) == (other.image, other.rank)
 
 
 def test_the_largest_missed_and_the_most_confident_false_come_first(files):

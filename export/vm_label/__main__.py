@@ -1,8 +1,0 @@
-"""python -m vm_label runs vm-label."""
-
-import sys
-
-from .cli import main
-
-if __name__ == "__main__":
-    sys.exit(main())
