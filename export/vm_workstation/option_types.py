@@ -26,3 +26,9 @@ def add_set(made: argparse._ActionsContainer, example: str) -> None:
         metavar="SECTION.ENTRY=VALUE",
         help=f"override an entry: {example}; repeatable",
     )
+
+
+def add_device(made: argparse._ActionsContainer) -> None:
+    """Add --device: what trains."""
+    devices = ("auto", "cpu", "cuda")
+    made.add_argument("--device", choices=devices, default="auto", help="default: a GPU if there is one, else the CPU")

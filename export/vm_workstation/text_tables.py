@@ -1,4 +1,4 @@
-"""Tables of numbers as lines of text, for a terminal."""
+"""Lists and tables as lines of text, for a terminal."""
 
 from __future__ import annotations
 
@@ -21,3 +21,9 @@ def summary(values: Sequence[float]) -> dict[str, float]:
     """Least, 5 %, median, mean, 95 % and largest of some numbers."""
     low, few, median, many, high = (float(each) for each in np.percentile(values, [0, 5, 50, 95, 100]))
     return {"least": low, "5 %": few, "median": median, "mean": float(np.mean(values)), "95 %": many, "largest": high}
+
+
+def shortened(lines: Sequence[str], most: int, rest: str) -> list[str]:
+    """The first `most` lines, and if there are more, another one: "and 3 more" with `rest` as its end."""
+    more = [f"and {len(lines) - most} more{rest}"] if len(lines) > most else []
+    return [*lines[:most], *more]

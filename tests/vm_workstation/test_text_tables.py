@@ -1,6 +1,8 @@
 """Tables and summaries."""
 
-from vm_workstation.text_tables import aligned, summary
+import pytest
+
+from vm_workstation.text_tables import aligned, shortened, summary
 
 
 def test_the_first_column_is_flush_left_and_the_others_flush_right():
@@ -16,3 +18,10 @@ def test_a_summary_is_right():
         "95 %": 95.0,
         "largest": 100.0,
     }
+
+
+@pytest.mark.parametrize(
+    ("most", "found"), [(4, ["a", "b", "c"]), (3, ["a", "b", "c"]), (2, ["a", "b", "and 1 more; see there"])]
+)
+def test_it_says_how_many_lines_it_leaves_out(most, found):
+    assert shortened(["a", "b", "c"], most, "; see there") == found

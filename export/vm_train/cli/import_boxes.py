@@ -15,7 +15,7 @@ from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.network.bundled import SHIPPED
 from vm_workstation.option_types import add_set
-from vm_workstation.shortened import shortened
+from vm_workstation.text_tables import shortened
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.findings import finding_lines

@@ -13,7 +13,7 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
-from vm_workstation.option_types import add_set, at_least
+from vm_workstation.option_types import add_device, add_set, at_least
 from vm_workstation.worker_process import check_shared_memory
 
 from ..data.pictures import find_pictures
@@ -22,7 +22,6 @@ from ..learning.class_table import ClassTable
 from ..learning.folder_access import locked
 from ..look.configuration import LOOK_HEADER, LookConfiguration
 from .box_options import add_box_options
-from .device_option import add_device
 from .fine_tuning import begin_fine_tuning
 from .training import stop_requests
 

@@ -8,10 +8,9 @@ from pathlib import Path
 
 from vm_embedded.cli.program import Parser
 from vm_embedded.network.bundled import SHIPPED
-from vm_workstation.option_types import add_set, at_least
+from vm_workstation.option_types import add_device, add_set, at_least
 
 from .check import check_parser
-from .device_option import add_device
 from .fine_tuning import tune_config_parser
 from .import_boxes import import_boxes_parser
 from .import_pictures import import_parser

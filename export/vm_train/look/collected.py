@@ -12,7 +12,7 @@ import numpy as np
 from vm_embedded.arrays import Mask
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
-from vm_workstation.shortened import shortened
+from vm_workstation.text_tables import shortened
 
 from .collection import collect_patches
 from .patch_set import PatchChunk, PatchSet
