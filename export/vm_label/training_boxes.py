@@ -14,7 +14,7 @@ from pathlib import Path
 from vm_embedded.cameras.image_files import lens_file_of
 from vm_embedded.errors import InputError
 from vm_embedded.files import atomic_folder, read_bytes, real_path
-from vm_embedded.output.box_files import CLASSES, yolo_line
+from vm_embedded.output.box_files import CLASSES, OBJECT, yolo_line
 
 from .box_folder import BoxFolder
 from .crops import Crop, replaced, whole_picture
@@ -97,14 +97,17 @@ def _check_target(source: Path, target: Path) -> None:
 
 
 def _write_image(folder: BoxFolder, target: Path, image: str, crops: list[Crop]) -> None:
-    """Write an image with its boxes, its lens file if it has one, and the classes beside it. Raises InputError or
-    OSError."""
+    """Write an image with its boxes, its lens file if it has one, and classes and object.toml beside it. Raises
+    InputError or OSError."""
     source, copy = folder.path / image, target / image
     copy.parent.mkdir(parents=True, exist_ok=True)
     copy.write_bytes(read_bytes(source))
     lens = lens_file_of(source)
     if lens is not None:
         copy.with_name(lens.name).write_bytes(read_bytes(lens))
+    shape = source.with_name(OBJECT)
+    if shape.exists():
+        copy.with_name(OBJECT).write_bytes(read_bytes(shape))
     numbers = {name: number for number, name in enumerate(folder.classes)}
     lines = [yolo_line(numbers[crop.class_name], crop.shares) for crop in crops]
     copy.with_suffix(".txt").write_text("".join(lines), encoding="utf-8")

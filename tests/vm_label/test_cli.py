@@ -43,6 +43,7 @@ def test_only_fully_judged_images_become_training_data(tmp_path):
     (folder / "image0005.txt").unlink()
     kept = [line for line in (folder / "candidates.jsonl").read_text().splitlines() if "image0005" not in line]
     (folder / "candidates.jsonl").write_text("\n".join(kept) + "\n")
+    (folder / "object.toml").write_text("radius = 0.11\n")
     judge(folder, ["yes", "no", "no", "no", "yes", "skip", "yes", None, "no", "yes"])
     done = run(folder, "--write", tmp_path / "out")
     assert done.stdout.splitlines() == [
@@ -56,6 +57,7 @@ def test_only_fully_judged_images_become_training_data(tmp_path):
     assert sorted(path.name for path in out.iterdir()) == sorted(
         [
             "classes.txt",
+            "object.toml",
             *(f"{kind}000{i}.{end}" for i in (0, 1, 4) for kind, end in [("image", "jpg"), ("image", "txt")]),
         ]
         + [f"lens000{i}.yaml" for i in (0, 1, 4)]

@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import ModelFile, read_model
+from vm_embedded.output.box_files import read_object_file
 
 from ..boxes.box import BoxedPicture
 from ..boxes.findings import finding_lines
@@ -50,6 +51,8 @@ def run_boxes(options: argparse.Namespace) -> int:
     _complain(finding_lines(found.findings, False, f"vm-train check {options.boxes} --boxes --verbose lists all"))
     check_boxes(found, name, str(options.boxes))
     frames = _chosen(found.pictures, options.boxes, options.list, options.part)
+    if settings.object_radius is None:
+        settings = replace(settings, object_radius=_radius_of(frames))
     posed = sum(_has_pose(each) for each in frames)
     search = None if posed == len(frames) else Search.of(found.pictures, name, is_round(manifest))
     bare = next((each for each, model in models.items() if model.manifest.look is None), None)
@@ -75,6 +78,13 @@ def run_boxes(options: argparse.Namespace) -> int:
         write_box_evaluation(options.output, content, box_page(f"{options.boxes.name}: {name}", about + notes, scores))
         print(f"\n{options.output / 'report.html'}: written, with the worst errors; scores.json is beside it")
     return EXIT_OK
+
+
+def _radius_of(frames: Sequence[BoxedPicture]) -> float | None:
+    """The radius [m] in the object.toml beside all frames, if it is the same. Raises InputError."""
+    shapes = [read_object_file(each) for each in {frame.image.parent for frame in frames}]
+    radii = {None if each is None else each.radius for each in shapes}
+    return radii.pop() if len(radii) == 1 else None
 
 
 def _chosen(

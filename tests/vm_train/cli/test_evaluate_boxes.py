@@ -61,10 +61,16 @@ def test_with_lens_and_pose_the_whole_detector_is_scored(boxes, tmp_path):
     assert "ball-small" in page
 
 
-def test_an_object_radius_changes_what_the_detector_finds(boxes):
-    wrong = run("--boxes", boxes, "ball", "--object-radius", "0.25", "--workers", 1)
-    assert "recall" in wrong.stdout
-    assert "100 %" not in wrong.stdout.split("recall")[1].splitlines()[1]
+def test_an_object_radius_changes_what_the_detector_finds(boxes, tmp_path):
+    """As an option, or in the object.toml of the boxes."""
+    folder = shutil.copytree(boxes, tmp_path / "boxes")
+    (folder / "object.toml").write_text("radius = 0.25\n")
+    given, read = (
+        run("--boxes", each, "ball", *options, "--workers", 1).stdout.replace(str(each), "")
+        for each, options in ((boxes, ("--object-radius", "0.25")), (folder, ()))
+    )
+    assert given == read
+    assert "100 %" not in given.split("recall")[1].splitlines()[1]
 
 
 def test_without_lens_the_close_look_is_scored(without_lenses, tmp_path):
