@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ..live.memory import resident_bytes
+from ..live.system import resident_bytes
 from ..network.onnx_model import RUNTIME_VERSION
 from .processor import read_processor
 

@@ -10,8 +10,8 @@ from ..detection.cache import MeshCache
 from ..detection.detections import Detections
 from ..output.channels import Channels
 from ..poses.stream import PoseStream
-from .memory import resident_bytes
 from .prometheus import Histogram, to_prometheus_text
+from .system import resident_bytes
 
 
 @dataclass

@@ -40,9 +40,9 @@ from .frame_watchdog import FrameWatchdog
 from .health import Health
 from .load_detector import find_opener, load_checked_detector
 from .log import EventLog
-from .memory import give_back_memory, resident_bytes
 from .reloading import read_again
 from .status_page import StatusPage
+from .system import give_back_memory, resident_bytes
 from .systemd import SystemdNotifier
 
 EXIT_OK, EXIT_FAILED, EXIT_RESTART, EXIT_CONFIGURATION = 0, 1, 75, 78

@@ -19,7 +19,7 @@ from .control import REFUSED
 from .frame_views import FrameViews
 from .http_server import HttpServer, Page, Query, Response
 from .page_token import kept_token
-from .temperatures import read_temperatures
+from .system import read_temperatures
 from .threshold import threshold_name, with_settings, with_threshold
 
 _PAGE = Path(__file__).with_name("status_page.html")

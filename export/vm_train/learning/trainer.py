@@ -25,9 +25,8 @@ from vm_export.torch_files import load_values, save_values
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
-from .loss import point_losses
+from .loss import peak_losses, point_losses, targets_of
 from .optimizer import ScheduledOptimizer
-from .peak_loss import peak_losses, targets_of
 from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
 

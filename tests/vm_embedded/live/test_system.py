@@ -1,6 +1,6 @@
 """Temperatures from files as Linux has them."""
 
-from vm_embedded.live.temperatures import read_temperatures
+from vm_embedded.live.system import read_temperatures
 
 
 def zone(folder, number, name, temperature):
