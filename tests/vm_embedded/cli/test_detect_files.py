@@ -113,7 +113,8 @@ def test_live_plays_the_images_of_a_pattern_in_their_order(tmp_path):
         shutil.copy(beside(image), tmp_path / f"lens{10**number}.yaml")
     options = ("--model", MODEL, "--camera-max-age-ms", "10000", "--status-socket", tmp_path / "vm-detect.sock")
     played = lines(run("image1*.jpg", "--live", "--camera-fps", "1", *options, cwd=tmp_path))
-    one, two, three = (each["detections"] for each in played if each["type"] == "frame")
+    # On a machine that is too slow for a second a frame, the camera may begin again; it ends after all three.
+    *_, one, two, three = (each["detections"] for each in played if each["type"] == "frame")
     assert one == three != two
 
 
