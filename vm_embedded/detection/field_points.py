@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Singles
 from ..field.features import FieldFeatures
 from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundPoints
@@ -47,19 +47,25 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
 def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
     view, classes = observation.view, observation.manifest.classes
-    steep = np.flatnonzero(observation.rays[:, 2] < -_LOWEST)
-    steep = steep[np.argsort(observation.rays[steep, 2], kind="stable")]  # the mesh is nearly in this order
-    rays = observation.rays[steep]
-    probabilities = np.nan_to_num(observation.probabilities[steep])  # one NaN would spoil the sums of all others
-    outside = np.zeros(len(steep), np.float32)
-    for column, each in enumerate(classes):
-        if each.kind == "background":
-            outside += probabilities[:, column]
+    rays, probabilities = observation.layout.rays.T, observation.slot_probabilities.T
+    slots = observation.shown[rays[2, observation.shown] < -_LOWEST]
+    slots = slots[np.argsort(rays[2, slots], kind="stable")]  # the mesh is nearly in this order
+    scale = -view.height / rays[2, slots]
+    positions = view.heading[:2, :2] @ np.stack([rays[0, slots] * scale, rays[1, slots] * scale])
+    outside = np.zeros(len(slots), np.float32)
+    named: dict[str, Singles] = {}
+    for row, each in zip(probabilities, classes, strict=True):
+        if each.kind == "background" or each.name in ROLES:
+            values = np.nan_to_num(row[slots])  # one NaN would spoil the sums of all others
+            if each.kind == "background":
+                outside += values
+            if each.name in ROLES:
+                named[each.name] = values
     return GroundPoints(
-        positions=rays[:, :2] * (-view.height / rays[:, 2:]),
+        positions=positions.T,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
-        classes={each.name: probabilities[:, number] for number, each in enumerate(classes) if each.name in ROLES},
+        classes=named,
         outside=outside,
         ahead=view.heading[:2, 0],
     )

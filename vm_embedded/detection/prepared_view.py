@@ -55,8 +55,9 @@ class PreparedView(NamedTuple):
 
     def plane_pixels(self, places: Floats) -> Floats:
         """Pixels (n, 2) of places (n, 2) [m] on the plane, from below the camera; NaN where the lens sees nothing."""
-        toward = np.column_stack([places, np.full(len(places), -self.height)]) @ self.heading
-        return self.ray_pixels(toward / np.linalg.norm(toward, axis=1, keepdims=True))
+        x, y = (places @ self.heading[:2, :2]).T
+        rays = np.stack([x, y, np.full(len(places), -self.height)])
+        return self.ray_pixels((rays / np.sqrt(x * x + y * y + self.height**2)).T)
 
     def in_picture(self, pixels: Floats) -> Mask:
         """Which pixels (n, 2) are inside the picture; NaN is not."""

@@ -12,13 +12,16 @@ import cv2
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask
-from .ground_points import GroundPoints, cross, split
+from .ground_points import GroundPoints, cross
 
 _COLUMN = 0.04
 """Width of a column of points [rad]."""
 
 _FEWEST = 2.0
 """A column shows the border only if so many points behind it are outside, and so many in front are of the field."""
+
+_FEWEST_PLACES = 3
+"""A border has at least so many places."""
 
 _AGREES = 0.03
 """A place agrees with a border if they differ by less than this share of the distance, or by less than the mesh can
@@ -36,40 +39,49 @@ def find_border(points: GroundPoints) -> Floats:
     if not len(points.ranges):
         return np.empty((0, 2))
     places, ended = _ends_of_field(points)
-    if ended.sum() < 3:
+    if np.count_nonzero(ended) < _FEWEST_PLACES:
         return np.empty((0, 2))
     limit = max(_AGREES, points.across / points.height)
+    ranges = np.hypot(*places.T)
     left = np.arange(len(places))
-    best, most = left[:0], -1
+    best, beyond, most = left[:0], ranges, -1
     for _ in range(_MOST_HULLS):
-        corners = left[_hull(places[left])]
-        agreeing = int((np.abs(_beyond(places, corners)) < limit).sum())
-        if agreeing > most + 1:  # one place more may agree by chance; then the hull with more corners stays
-            best, most = corners, agreeing
-        if len(left) <= 3 or most > _ENOUGH * len(places):
+        at = _hull(places[left])
+        if len(at) < 2:
             break
-        left = left[left != _farthest(places, left, corners)]
-    return _part_that_ends(best, places, ended, limit)
+        corners = left[at]
+        this = _beyond(places, corners)
+        agreeing = np.count_nonzero(np.abs(this) < limit)
+        if agreeing > most + 1:  # one place more may agree by chance; then the hull with more corners stays
+            best, beyond, most = corners, this, agreeing
+        if len(left) <= _FEWEST_PLACES or most > _ENOUGH * len(places):
+            break
+        left = np.delete(left, _farthest(ranges[left], at))
+    return _part_that_ends(best, places, ended, beyond, limit)
 
 
 def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     """The farthest place of the field (c, 2) [m] in each column of points, from right to left, and whether something
-    else begins there (c,); otherwise the field may go on where the frame or the mesh ends."""
-    columns = ((points.azimuths + np.pi) / _COLUMN).astype(np.int16)
+    else begins there (c,); otherwise the field may go on where the frame or the mesh ends.
+
+    In each column, the place parts points of the field from points outside best: for points with the values 1, 1, -1
+    and -1, from near to far, it is behind the second one.
+    """
+    columns = ((points.azimuths + np.pi) * (1.0 / _COLUMN)).astype(np.int16)
     order = np.argsort(columns, kind="stable")  # from near to far in each column, as the points are
     inside = sum((points.classes[name] for name in ("field", "line") if name in points.classes), np.float32(0.0))
-    values = np.asarray((inside - points.outside)[order], dtype=np.float64)
-    columns, ranges = columns[order], points.ranges[order]
-    last, gain = split(columns, values)
-    ends = np.append(np.flatnonzero(np.diff(columns)), len(columns) - 1)
-    sums = np.cumsum(values)
-    outside = sums[last] - sums[ends]
-    seen = (last >= 0) & (gain >= _FEWEST)
-    ended = (outside >= _FEWEST)[seen]
-    last, ends = last[seen], ends[seen]
-    far = 0.5 * (ranges[last] + ranges[np.minimum(last + 1, ends)])
-    azimuths = (columns[last].astype(np.float64) + 0.5) * _COLUMN - np.pi
-    return points.directions(azimuths) * far[:, None], ended
+    values = (inside - points.outside)[order]
+    sums = np.cumsum(values, dtype=np.float64)
+    starts = np.flatnonzero(np.diff(columns[order], prepend=-1))
+    final = np.append(starts[1:], len(sums)) - 1
+    best = np.maximum.reduceat(sums, starts)
+    at_best = np.flatnonzero(sums == np.repeat(best, final + 1 - starts))
+    seen = best - (sums[starts] - values[starts]) >= _FEWEST
+    final, best = final[seen], best[seen]
+    last = at_best[np.searchsorted(at_best, final, side="right") - 1]
+    far = 0.5 * (points.ranges[order[last]] + points.ranges[order[np.minimum(last + 1, final)]])
+    azimuths = (columns[order[final]] + 0.5) * _COLUMN - np.pi
+    return points.directions(azimuths) * far[:, None], best - sums[final] >= _FEWEST
 
 
 def _hull(places: Floats) -> Chosen:
@@ -77,50 +89,51 @@ def _hull(places: Floats) -> Chosen:
 
     The point below the camera closes the hull, so only corners away from the camera are left.
     """
-    around = np.concatenate([places, np.zeros((1, 2))]).astype(np.float32)
+    around = np.zeros((len(places) + 1, 2), np.float32)
+    around[:-1] = places
     numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
     return np.sort(numbers[numbers < len(places)])
 
 
 def _beyond(places: Floats, corners: Chosen) -> Floats:
-    """How far places (c, 2) are beyond the polyline through some of them, as a share of its distance there."""
-    if len(corners) < 2:
-        return np.full(len(places), np.inf)
-    piece = _pieces(len(places), corners)
-    a = places[corners][piece]
-    along = np.diff(places[corners], axis=0)[piece]
+    """How far places (c, 2) are beyond the polyline through at least two of them, as a share of its distance there."""
+    a, along = places[corners[:-1]], np.diff(places[corners], axis=0)
     # The ray t * place meets the line through a piece where the cross product of (t * place - a) and `along` is zero.
-    return np.asarray(cross(places, along) / cross(a, along) - 1.0)
+    lines = along[:, ::-1] * (1.0, -1.0) / cross(a, along)[:, None]
+    return np.asarray((places * lines[_pieces(len(places), corners)]).sum(axis=1) - 1.0)
 
 
 def _pieces(count: int, corners: Chosen) -> Chosen:
     """The piece of a polyline through some of `count` places that is in the direction of each."""
-    return np.clip(np.searchsorted(corners, np.arange(count), side="right") - 1, 0, len(corners) - 2)
+    inner = np.zeros(count, dtype=np.intp)
+    inner[corners[1:-1]] = 1
+    return np.cumsum(inner)
 
 
-def _farthest(places: Floats, left: Chosen, corners: Chosen) -> int:
-    """The corner that is farthest beyond the places beside it, of those that are left."""
-    ranges = np.hypot(places[left, 0], places[left, 1])
-    at = np.searchsorted(left, corners)
-    beside = ranges[np.maximum(at - 1, 0)] + ranges[np.minimum(at + 1, len(left) - 1)]
-    return int(corners[np.argmax(ranges[at] / beside)])
+def _farthest(ranges: Floats, corners: Chosen) -> int:
+    """The corner that is farthest beyond the places beside it. ranges (c,) [m]: of the places."""
+    beside = ranges[np.maximum(corners - 1, 0)] + ranges[np.minimum(corners + 1, len(ranges) - 1)]
+    return int(corners[np.argmax(ranges[corners] / beside)])
 
 
-def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, limit: float) -> Floats:
-    """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
+def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, beyond: Floats, limit: float) -> Floats:
+    """The longest part of a polyline along which the field ends, by the number of places that agree with it.
+
+    beyond (c,): see _beyond.
+    """
     if len(corners) < 2:
         return np.empty((0, 2))
-    beyond = _beyond(places, corners)
     agrees = ended & (np.abs(beyond) < limit)
-    up_to = np.concatenate([[0], np.cumsum(agrees)])  # how many places agree before each
+    up_to = np.append(0, np.cumsum(agrees))  # how many places agree before each
     agreeing = up_to[corners[1:] + 1] - up_to[corners[:-1]]
     both = ended[corners[1:]] & ended[corners[:-1]]
     kept = both | (agreeing > 0.5 * (corners[1:] - corners[:-1] + 1))
-    run = np.cumsum(np.diff(kept, prepend=False) != 0)
+    run = np.cumsum(np.diff(kept, prepend=False))
     support = np.bincount(run, np.where(kept, agreeing, 0))
-    if support.max() < 3:
+    longest = int(np.argmax(support))
+    if support[longest] < _FEWEST_PLACES:
         return np.empty((0, 2))
-    pieces = np.flatnonzero(run == np.argmax(support))
+    pieces = np.flatnonzero(run == longest)
     part = slice(pieces[0], pieces[-1] + 2)
     moved = _without_margin(places, corners, beyond, agrees)[part]
     outer = _hull(moved)  # each corner moved on its own, so some may point inward now

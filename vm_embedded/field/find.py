@@ -101,7 +101,11 @@ def _straight_and_round(points: LinePoints, likely: LinePoints) -> tuple[list[Pi
     if circle is not None:
         on = np.zeros(len(likely), dtype=bool)
         on[circle.members] = True
-        pieces = [each for each in pieces if each.length >= 2.0 * circle.radius or on[each.members].mean() < 0.5]
+        pieces = [
+            each
+            for each in pieces
+            if each.length >= 2.0 * circle.radius or np.count_nonzero(on[each.members]) < 0.5 * len(each.members)
+        ]
     return pieces, circle
 
 
@@ -114,7 +118,9 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     """Mean places (p, 2) [m] and probabilities (p,) of the line points in each square."""
     if not len(points):
         return np.empty((0, 2)), np.empty(0, np.float32)
-    cells = np.floor(points.positions / _CELL).astype(np.int64)
-    _, number, count = np.unique(cells[:, 0] * (1 << 20) + cells[:, 1], return_inverse=True, return_counts=True)
-    sums = [np.bincount(number, each) / count for each in (*points.positions.T, points.weights)]
-    return np.stack(sums[:2], axis=1), sums[2].astype(np.float32)
+    cells = np.floor(points.positions * (1.0 / _CELL)) @ (1024.0, 1.0)  # points of a square have the same number
+    order = np.argsort(cells)
+    starts = np.flatnonzero(np.diff(cells[order], prepend=-np.inf))
+    columns = np.stack([*points.positions.T, points.weights])[:, order]
+    x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
+    return np.stack([x, y], axis=1), weights.astype(np.float32)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Chosen, Floats, Singles
+from ..arrays import Floats, Singles
 
 ROLES = ("goal", "robot", "line", "field")
 """Names of the classes that field features are made of."""
@@ -42,7 +39,8 @@ class GroundPoints:
     def azimuths(self) -> Floats:
         """Direction (n,) [rad] on the plane, counterclockwise from `ahead`: -pi and pi are behind the camera."""
         x, y = self.ahead
-        return np.asarray(np.arctan2(self.positions @ (-y, x), self.positions @ self.ahead))
+        ahead, left = np.array([[x, y], [-y, x]]) @ self.positions.T
+        return np.arctan2(left.astype(np.float32), ahead.astype(np.float32)).astype(np.float64)
 
     def directions(self, azimuths: Floats) -> Floats:
         """Unit vectors (m, 2) at azimuths (m,) [rad]."""
@@ -57,19 +55,3 @@ class GroundPoints:
 def cross(a: Floats, b: Floats) -> Floats:
     """Cross product (...,) of vectors (..., 2) on the plane: positive if b is to the left of a."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
-def split(columns: npt.NDArray[np.integer[Any]], values: Floats) -> tuple[Chosen, Floats]:
-    """For each column of points, sorted from near to far, the place that best parts positive from negative values.
-
-    columns (n,): number of each point's column, sorted. values (n,). Returns for each column that occurs the position
-    of the last point before the best split, or -1 if all values are better behind it, and the sum of the values there.
-    For one column with the values 1, 1, -1, -1 these are 1 and 2.
-    """
-    starts = np.flatnonzero(np.diff(columns, prepend=-1))
-    counts = np.diff(np.append(starts, len(values)))
-    sums = np.cumsum(values)
-    sums = sums - np.repeat(sums[starts] - values[starts], counts)
-    best = np.maximum.reduceat(sums, starts)
-    last = np.maximum.reduceat(np.where(sums == np.repeat(best, counts), np.arange(len(values)), -1), starts)
-    return np.where(best > 0.0, last, -1), best
