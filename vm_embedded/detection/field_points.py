@@ -56,7 +56,7 @@ def ground_points(observation: Observation) -> GroundPoints:
     named: dict[str, Singles] = {}
     for row, each in zip(probabilities, classes, strict=True):
         if each.kind == "background" or each.name in ROLES:
-            values = np.nan_to_num(row[slots])  # one NaN would spoil the sums of all others
+            values = np.fmax(row[slots], 0.0)  # 0 for NaN: one NaN would spoil the sums of all others
             if each.kind == "background":
                 outside += values
             if each.name in ROLES:

@@ -8,11 +8,14 @@ hulls with fewer corners are tried, too, and the one that most places agree with
 
 from __future__ import annotations
 
-import cv2
+from bisect import bisect_left
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask
-from .ground_points import GroundPoints, cross
+from .ground_points import GroundPoints, cross, starts_of_runs
 
 _COLUMN = 0.04
 """Width of a column of points [rad]."""
@@ -42,22 +45,16 @@ def find_border(points: GroundPoints) -> Floats:
     if np.count_nonzero(ended) < _FEWEST_PLACES:
         return np.empty((0, 2))
     limit = max(_AGREES, points.across / points.height)
-    ranges = np.hypot(*places.T)
-    left = np.arange(len(places))
-    best, beyond, most = left[:0], ranges, -1
-    for _ in range(_MOST_HULLS):
-        at = _hull(places[left])
-        if len(at) < 2:
+    hulls = _hulls(places)
+    beyond = _beyond(places, hulls)
+    agreeing = np.count_nonzero(np.abs(beyond) < limit, axis=1).tolist()
+    best = 0
+    for number, count in enumerate(agreeing):
+        if agreeing[best] > _ENOUGH * len(places):
             break
-        corners = left[at]
-        this = _beyond(places, corners)
-        agreeing = np.count_nonzero(np.abs(this) < limit)
-        if agreeing > most + 1:  # one place more may agree by chance; then the hull with more corners stays
-            best, beyond, most = corners, this, agreeing
-        if len(left) <= _FEWEST_PLACES or most > _ENOUGH * len(places):
-            break
-        left = np.delete(left, _farthest(ranges[left], at))
-    return _part_that_ends(best, places, ended, beyond, limit)
+        if count > agreeing[best] + 1:  # one place more may agree by chance; then the hull with more corners stays
+            best = number
+    return _part_that_ends(np.array(hulls[best]), places, ended, beyond[best], limit)
 
 
 def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
@@ -72,7 +69,7 @@ def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     inside = sum((points.classes[name] for name in ("field", "line") if name in points.classes), np.float32(0.0))
     values = (inside - points.outside)[order]
     sums = np.cumsum(values, dtype=np.float64)
-    starts = np.flatnonzero(np.diff(columns[order], prepend=-1))
+    starts = starts_of_runs(columns[order])
     final = np.append(starts[1:], len(sums)) - 1
     best = np.maximum.reduceat(sums, starts)
     at_best = np.flatnonzero(sums == np.repeat(best, final + 1 - starts))
@@ -84,36 +81,66 @@ def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     return points.directions(azimuths) * far[:, None], best - sums[final] >= _FEWEST
 
 
-def _hull(places: Floats) -> Chosen:
-    """Numbers of the places that are corners of their hull, from right to left.
+def _hulls(places: Floats) -> list[list[int]]:
+    """The hull of places (c, 2) from right to left, and others, each without a corner of the one before: the one that
+    is farthest beyond the places beside it."""
+    numbers = _complex(places)
+    ranges = [abs(each) for each in numbers]
+    left = list(range(len(places)))
+    hulls = [_hull(numbers, left)]
+    while len(hulls) < _MOST_HULLS and len(left) > _FEWEST_PLACES:
+        corners = hulls[-1]
+        most, at, where = max(
+            (ranges[corner] / (ranges[left[max(where - 1, 0)]] + ranges[left[min(where + 1, len(left) - 1)]]), at, where)
+            for at, corner in enumerate(corners)
+            for where in [bisect_left(left, corner)]
+        )
+        del left[where]
+        # The hull changes only between the corners beside the one that is gone.
+        first = bisect_left(left, corners[at - 1]) if at else 0
+        last = bisect_left(left, corners[at + 1]) + 1 if at + 1 < len(corners) else len(left)
+        hulls.append([*corners[: max(at - 1, 0)], *_hull(numbers, left[first:last]), *corners[at + 2 :]])
+    return hulls
+
+
+def _hull(places: Sequence[complex], numbers: Sequence[int]) -> list[int]:
+    """Those numbers of places, from right to left, that are corners of their hull.
 
     The point below the camera closes the hull, so only corners away from the camera are left.
     """
-    around = np.zeros((len(places) + 1, 2), np.float32)
-    around[:-1] = places
-    numbers = cv2.convexHull(around, returnPoints=False, clockwise=False).ravel()
-    return np.sort(numbers[numbers < len(places)])
+    corners: list[int] = []
+    for number in numbers:
+        while len(corners) > 1:
+            before, corner = places[corners[-2]], places[corners[-1]]
+            if ((corner - before).conjugate() * (places[number] - corner)).imag > 0.0:  # it turns left there
+                break
+            corners.pop()
+        corners.append(number)
+    return corners
 
 
-def _beyond(places: Floats, corners: Chosen) -> Floats:
-    """How far places (c, 2) are beyond the polyline through at least two of them, as a share of its distance there."""
-    a, along = places[corners[:-1]], np.diff(places[corners], axis=0)
-    # The ray t * place meets the line through a piece where the cross product of (t * place - a) and `along` is zero.
-    lines = along[:, ::-1] * (1.0, -1.0) / cross(a, along)[:, None]
-    return np.asarray((places * lines[_pieces(len(places), corners)]).sum(axis=1) - 1.0)
+def _complex(places: Floats) -> list[complex]:
+    """Places (c, 2) as complex numbers."""
+    return list(map(complex, *places.T.tolist()))
 
 
-def _pieces(count: int, corners: Chosen) -> Chosen:
-    """The piece of a polyline through some of `count` places that is in the direction of each."""
-    inner = np.zeros(count, dtype=np.intp)
-    inner[corners[1:-1]] = 1
-    return np.cumsum(inner)
+def _beyond(places: Floats, hulls: Sequence[Sequence[int]]) -> Floats:
+    """How far places (c, 2) are beyond polylines through at least two of them, as a share of their distance there.
+
+    hulls: numbers of the corners of h polylines. Returns the shares (h, c).
+    """
+    start = places[[corner for corners in hulls for corner in corners[:-1]]]
+    along = places[[corner for corners in hulls for corner in corners[1:]]] - start
+    # The ray t * place meets the line through a piece where the cross product of (t * place - start) and `along` is
+    # zero.
+    lines = along[:, ::-1] * (1.0, -1.0) / cross(start, along)[:, None]
+    counts = [count for corners in hulls for count in _counts(len(places), corners)]
+    return (np.repeat(lines, counts, axis=0).reshape(len(hulls), -1, 2) * places).sum(axis=2) - 1.0
 
 
-def _farthest(ranges: Floats, corners: Chosen) -> int:
-    """The corner that is farthest beyond the places beside it. ranges (c,) [m]: of the places."""
-    beside = ranges[np.maximum(corners - 1, 0)] + ranges[np.minimum(corners + 1, len(ranges) - 1)]
-    return int(corners[np.argmax(ranges[corners] / beside)])
+def _counts(count: int, corners: Sequence[int]) -> list[int]:
+    """How many of `count` places are in the direction of each piece of a polyline through some of them."""
+    return [last - first for first, last in pairwise([0, *corners[1:-1], count])]
 
 
 def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, beyond: Floats, limit: float) -> Floats:
@@ -121,8 +148,6 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, beyond: Floats
 
     beyond (c,): see _beyond.
     """
-    if len(corners) < 2:
-        return np.empty((0, 2))
     agrees = ended & (np.abs(beyond) < limit)
     up_to = np.append(0, np.cumsum(agrees))  # how many places agree before each
     agreeing = up_to[corners[1:] + 1] - up_to[corners[:-1]]
@@ -136,8 +161,8 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, beyond: Floats
     pieces = np.flatnonzero(run == longest)
     part = slice(pieces[0], pieces[-1] + 2)
     moved = _without_margin(places, corners, beyond, agrees)[part]
-    outer = _hull(moved)  # each corner moved on its own, so some may point inward now
-    return np.asarray(moved[outer] * (1.0 + _beyond(moved, outer).mean())) if len(outer) > 1 else moved[:0]
+    outer = _hull(_complex(moved), range(len(moved)))  # each corner moved on its own, so some may point inward now
+    return np.asarray(moved[outer] * (1.0 + _beyond(moved, [outer]).mean()))
 
 
 def _without_margin(places: Floats, corners: Chosen, beyond: Floats, agrees: Mask) -> Floats:
@@ -145,7 +170,7 @@ def _without_margin(places: Floats, corners: Chosen, beyond: Floats, agrees: Mas
 
     beyond (c,): see _beyond. agrees (c,): which places count.
     """
-    piece = _pieces(len(places), corners)
+    piece = np.repeat(np.arange(len(corners) - 1), _counts(len(places), corners.tolist()))
     count = np.bincount(piece[agrees], minlength=len(corners) - 1)
     total = np.bincount(piece[agrees], beyond[agrees], minlength=len(corners) - 1)
     beside = np.convolve(total, [1.0, 1.0]) / np.maximum(np.convolve(count, [1.0, 1.0]), 1.0)

@@ -12,7 +12,7 @@ from .circle import CirclePoints, find_circle
 from .crossings import find_crossings
 from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
 from .goals import pair_posts
-from .ground_points import GroundPoints
+from .ground_points import GroundPoints, starts_of_runs
 from .lines import LEAST, LinePoints, Piece, find_pieces, line_points
 from .ridges import Profiles, pieces_on_ridges
 from .uprights import KINDS, POST, ROBOT, Base, UprightRules, find_uprights
@@ -120,7 +120,7 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
         return np.empty((0, 2)), np.empty(0, np.float32)
     cells = np.floor(points.positions * (1.0 / _CELL)) @ (1024.0, 1.0)  # points of a square have the same number
     order = np.argsort(cells)
-    starts = np.flatnonzero(np.diff(cells[order], prepend=-np.inf))
-    columns = np.stack([*points.positions.T, points.weights])[:, order]
+    starts = starts_of_runs(cells[order])
+    columns = np.array([*points.positions.T, points.weights])[:, order]
     x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
     return np.stack([x, y], axis=1), weights.astype(np.float32)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 import numpy as np
 
-from ..arrays import Floats, Singles
+from ..arrays import Chosen, Floats, Singles
 
 ROLES = ("goal", "robot", "line", "field")
 """Names of the classes that field features are made of."""
@@ -50,6 +50,11 @@ class GroundPoints:
     def along(self, ranges: Floats) -> Floats:
         """Distance [m] to the next ring of points, along the ray, at these ranges [m]."""
         return np.asarray(self.across * np.hypot(ranges, self.height) / self.height)
+
+
+def starts_of_runs(numbers: Chosen) -> Chosen:
+    """Positions in numbers (n,), at least one, where runs of equal numbers start."""
+    return np.flatnonzero(np.concatenate([[True], numbers[1:] != numbers[:-1]]))
 
 
 def cross(a: Floats, b: Floats) -> Floats:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask, Singles
-from .ground_points import GroundPoints
+from .ground_points import GroundPoints, starts_of_runs
 
 LEAST = 0.1
 """Points with a smaller probability of the class line suggest no line."""
@@ -212,7 +212,7 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
 def _moments(positions: Floats) -> Floats:
     """1, x, y, x^2, x y and y^2 (6, n) of n places (n, 2)."""
     x, y = positions.T
-    return np.stack([np.ones(len(x)), x, y, x * x, x * y, y * y])
+    return np.array([np.ones(len(x)), x, y, x * x, x * y, y * y])
 
 
 def _fit(
@@ -249,9 +249,10 @@ def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]
     """The pieces of lines that their points speak for."""
     middles, directions = np.array([each.middle for each in lines]), np.array([each.direction for each in lines])
     across = directions[:, ::-1] * (1.0, -1.0)
-    off = np.abs(across @ points.positions.T - (across * middles).sum(axis=1)[:, None])
-    reach = points.tolerance(normals @ points.positions.T)
-    line, point = np.nonzero(off < reach[[each.axis for each in lines]])
+    reach = points.tolerance(normals @ points.positions.T).astype(np.float32)
+    off = across.astype(np.float32) @ points.positions.T.astype(np.float32)
+    off -= (across * middles).sum(axis=1, dtype=np.float32)[:, None]
+    line, point = np.nonzero(np.abs(off, out=off) < reach[[each.axis for each in lines]])
     along = ((points.positions[point] - middles[line]) * directions[line]).sum(axis=1)
     order = np.argsort(along + 4.0 * _FARTHEST * line)
     line, point, along = line[order], point[order], along[order]
@@ -280,7 +281,7 @@ def _best_stretches(values: Floats, groups: Chosen, least: float, lost: float) -
     """
     if not len(values):
         return []
-    starts = np.flatnonzero(np.diff(2 * groups + (values < 0.0), prepend=-1))  # of runs with the same sign
+    starts = starts_of_runs(2 * groups + (values < 0.0))
     sums, ends = np.add.reduceat(values, starts), [*starts[1:].tolist(), len(values)]
     found: list[tuple[int, int, float, float]] = []  # positions; sums of all values before and up to the end
     total, group, base = 0.0, -1, 0  # stretches before `base` are complete
