@@ -50,8 +50,8 @@ def ground_points(observation: Observation) -> GroundPoints:
     rays, probabilities = observation.layout.rays.T, observation.slot_probabilities.T
     slots = observation.shown[rays[2, observation.shown] < -_LOWEST]
     slots = slots[np.argsort(rays[2, slots], kind="stable")]  # the mesh is nearly in this order
-    scale = -view.height / rays[2, slots]
-    positions = view.heading[:2, :2] @ np.stack([rays[0, slots] * scale, rays[1, slots] * scale])
+    positions = rays[:2, slots]
+    positions *= -view.height / rays[2, slots]
     outside = np.zeros(len(slots), np.float32)
     named: dict[str, Singles] = {}
     for row, each in zip(probabilities, classes, strict=True):
@@ -62,7 +62,7 @@ def ground_points(observation: Observation) -> GroundPoints:
             if each.name in ROLES:
                 named[each.name] = values
     return GroundPoints(
-        positions=positions.T,
+        positions=(view.heading[:2, :2] @ positions).T,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
         classes=named,

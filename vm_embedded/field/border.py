@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask
-from .ground_points import GroundPoints, cross, starts_of_runs
+from .ground_points import GroundPoints, starts_of_runs
 
 _COLUMN = 0.04
 """Width of a column of points [rad]."""
@@ -89,13 +89,13 @@ def _hulls(places: Floats) -> list[list[int]]:
     left = list(range(len(places)))
     hulls = [_hull(numbers, left)]
     while len(hulls) < _MOST_HULLS and len(left) > _FEWEST_PLACES:
-        corners = hulls[-1]
-        most, at, where = max(
-            (ranges[corner] / (ranges[left[max(where - 1, 0)]] + ranges[left[min(where + 1, len(left) - 1)]]), at, where)
-            for at, corner in enumerate(corners)
-            for where in [bisect_left(left, corner)]
-        )
-        del left[where]
+        corners, most, at = hulls[-1], 0.0, 0
+        for number, corner in enumerate(corners):
+            where = bisect_left(left, corner)
+            beside = ranges[left[where - 1 if where else 0]] + ranges[left[where + 1 - (where + 1 == len(left))]]
+            if ranges[corner] > most * beside:
+                most, at = ranges[corner] / beside, number
+        del left[bisect_left(left, corners[at])]
         # The hull changes only between the corners beside the one that is gone.
         first = bisect_left(left, corners[at - 1]) if at else 0
         last = bisect_left(left, corners[at + 1]) + 1 if at + 1 < len(corners) else len(left)
@@ -129,13 +129,14 @@ def _beyond(places: Floats, hulls: Sequence[Sequence[int]]) -> Floats:
 
     hulls: numbers of the corners of h polylines. Returns the shares (h, c).
     """
-    start = places[[corner for corners in hulls for corner in corners[:-1]]]
-    along = places[[corner for corners in hulls for corner in corners[1:]]] - start
+    first, last = np.array([piece for corners in hulls for piece in pairwise(corners)]).T
+    (x, y), (along_x, along_y) = places[first].T, (places[last] - places[first]).T
     # The ray t * place meets the line through a piece where the cross product of (t * place - start) and `along` is
     # zero.
-    lines = along[:, ::-1] * (1.0, -1.0) / cross(start, along)[:, None]
+    lines = np.array([along_y, -along_x]) / (x * along_y - y * along_x)
     counts = [count for corners in hulls for count in _counts(len(places), corners)]
-    return (np.repeat(lines, counts, axis=0).reshape(len(hulls), -1, 2) * places).sum(axis=2) - 1.0
+    x, y = np.repeat(lines, counts, axis=1).reshape(2, len(hulls), -1)
+    return np.asarray(x * places[:, 0] + y * places[:, 1] - 1.0)
 
 
 def _counts(count: int, corners: Sequence[int]) -> list[int]:
@@ -153,7 +154,7 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, beyond: Floats
     agreeing = up_to[corners[1:] + 1] - up_to[corners[:-1]]
     both = ended[corners[1:]] & ended[corners[:-1]]
     kept = both | (agreeing > 0.5 * (corners[1:] - corners[:-1] + 1))
-    run = np.cumsum(np.diff(kept, prepend=False))
+    run = np.cumsum(np.append(kept[:1], kept[1:] != kept[:-1]))
     support = np.bincount(run, np.where(kept, agreeing, 0))
     longest = int(np.argmax(support))
     if support[longest] < _FEWEST_PLACES:
@@ -171,7 +172,8 @@ def _without_margin(places: Floats, corners: Chosen, beyond: Floats, agrees: Mas
     beyond (c,): see _beyond. agrees (c,): which places count.
     """
     piece = np.repeat(np.arange(len(corners) - 1), _counts(len(places), corners.tolist()))
-    count = np.bincount(piece[agrees], minlength=len(corners) - 1)
-    total = np.bincount(piece[agrees], beyond[agrees], minlength=len(corners) - 1)
-    beside = np.convolve(total, [1.0, 1.0]) / np.maximum(np.convolve(count, [1.0, 1.0]), 1.0)
+    count = np.bincount(piece, agrees)
+    total = np.bincount(piece, np.where(agrees, beyond, 0.0))
+    beside = np.append(total, 0.0) + np.append(0.0, total)
+    beside /= np.maximum(np.append(count, 0.0) + np.append(0.0, count), 1.0)
     return np.asarray(places[corners] * (1.0 + beside[:, None]))

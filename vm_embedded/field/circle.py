@@ -11,18 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Chosen, Floats, Mask
+from ..arrays import Chosen, Floats
 from .ground_points import cross
 from .lines import LinePoints
 
-_TRIES = 200
+_TRIES = 300
 """Number of circles that are tried."""
 
 _SHARES = np.outer(np.arange(1, _TRIES + 1), np.sqrt([2.0, 3.0, 5.0])) % 1.0
 """The three points of each circle, as shares of the number of points: multiples of an irrational number are spread
 evenly."""
 
-_MOST_VOTERS = 64
+_MOST_VOTERS = 100
 """Largest number of points that suggest circles and vote for them."""
 
 _RADII = (0.35, 1.7)
@@ -70,10 +70,15 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
         return None
     center, radius = best
     for _ in range(2):
-        away, off, on = _around(searched, center, radius)
+        normals, off, reach = _around(searched, center, radius)
+        on = np.abs(off) < reach
         if np.count_nonzero(on) < _FEWEST:
             return None
-        center, radius = _fit(searched.part(on), away[:, on], off[on], center, radius)
+        # One step of Gauss and Newton towards the least squares of distances, weighted by precision.
+        precision = np.sqrt(searched.weights * on) / reach
+        slopes = np.array([*normals, np.ones(len(off))]) * precision
+        step = np.linalg.lstsq(slopes @ slopes.T, slopes @ (off * precision), rcond=None)[0]
+        center, radius = center + step[:2], radius + float(step[2])
     return _checked(points, free, center, radius)
 
 
@@ -84,48 +89,38 @@ def _best_circle(points: LinePoints) -> tuple[Floats, float] | None:
     if not possible.any():
         return None
     centers, radii = centers[possible], radii[possible]
-    x, y = points.positions.T[:, :, None] - centers.T[:, None]  # (n, t)
-    off = np.abs(np.sqrt(x * x + y * y) - radii)
+    x, y = (points.positions.T[:, :, None] - centers.T[:, None]).astype(np.float32)  # (n, t)
+    off = np.abs(np.sqrt(x * x + y * y) - radii.astype(np.float32))
     tolerance = 0.04 + 0.6 * points.blur
     best = int(np.argmax(points.weights @ (2.0 * (off < tolerance[:, None]) - (off < 0.5 * radii))))
     return centers[best], float(radii[best])
 
 
 def _through(triples: Floats) -> tuple[Floats, Floats]:
-    """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); infinite for points in a row."""
+    """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); NaN for points in a row."""
     a, b = triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0]
     area = 2.0 * cross(a, b)
     area[np.abs(area) < 1e-6] = np.nan
     aa, bb = (a**2).sum(axis=1), (b**2).sum(axis=1)
     x = (b[:, 1] * aa - a[:, 1] * bb) / area
     y = (a[:, 0] * bb - b[:, 0] * aa) / area
-    return triples[:, 0] + np.stack([x, y], axis=1), np.nan_to_num(np.hypot(x, y), nan=np.inf)
+    return triples[:, 0] + np.array([x, y]).T, np.hypot(x, y)
 
 
-def _around(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, Floats, Mask]:
-    """Places (2, n) [m] of points as seen from the center of a circle, how far they are outside of it (n,) [m], and
-    which are on it (n,)."""
-    away = points.positions.T - center[:, None]
+def _around(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, Floats, Floats]:
+    """Unit vectors (2, n) from the center of a circle to points, how far they are outside of it (n,) [m], and how far
+    they may be (n,) [m]."""
+    places = points.positions.T
+    away = places - center[:, None]
     lengths = np.maximum(np.hypot(*away), 1e-9)
-    off = lengths - radius
-    return away, off, np.abs(off) < points.tolerance((points.positions.T * away).sum(axis=0) / lengths)
-
-
-def _fit(points: LinePoints, away: Floats, off: Floats, center: Floats, radius: float) -> tuple[Floats, float]:
-    """One step of Gauss and Newton towards the circle with the least squares of distances, weighted by precision.
-
-    away (2, n), off (n,): see _around.
-    """
-    normals = away / (off + radius)
-    precision = np.sqrt(points.weights) / points.tolerance((points.positions.T * normals).sum(axis=0))
-    slopes = np.stack([*normals, np.ones(len(off))]) * precision
-    step = np.linalg.lstsq(slopes @ slopes.T, slopes @ (off * precision), rcond=None)[0]
-    return center + step[:2], radius + float(step[2])
+    away /= lengths
+    return away, lengths - radius, points.tolerance((places * away).sum(axis=0))
 
 
 def _checked(points: LinePoints, free: Chosen, center: Floats, radius: float) -> CirclePoints | None:
     """The circle with all its points, or None if it is too small, too large, or too little of it is seen."""
-    (x, y), off, on = _around(points, center, radius)
+    (x, y), off, reach = _around(points, center, radius)
+    on = np.abs(off) < reach
     members = np.flatnonzero(on)
     if not _RADII[0] < radius < _RADII[1] or len(members) < _FEWEST:
         return None

@@ -54,7 +54,7 @@ def find_features(
     )
     posts = _uprights(found["goal"], KINDS["goal"], points.height, post_pixels)
     lines = tuple(
-        Segment(piece.ends, pixels, float(likely.weights[piece.members].mean()))
+        Segment(piece.ends, pixels, float(likely.weights[piece.members].sum()) / len(piece.members))
         for piece, pixels in zip(pieces, end_pixels.reshape(-1, 2, 2), strict=True)
     )
     thinned, confidences = _thinned(likely)
@@ -123,4 +123,4 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     starts = starts_of_runs(cells[order])
     columns = np.array([*points.positions.T, points.weights])[:, order]
     x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
-    return np.stack([x, y], axis=1), weights.astype(np.float32)
+    return np.array([x, y]).T, weights.astype(np.float32)

@@ -33,7 +33,8 @@ class GroundPoints:
     @cached_property
     def ranges(self) -> Floats:
         """Distance (n,) [m] on the plane from the point below the camera."""
-        return np.hypot(self.positions[:, 0], self.positions[:, 1])
+        x, y = self.positions.T
+        return np.asarray(np.sqrt(x * x + y * y))
 
     @cached_property
     def azimuths(self) -> Floats:
@@ -45,11 +46,11 @@ class GroundPoints:
     def directions(self, azimuths: Floats) -> Floats:
         """Unit vectors (m, 2) at azimuths (m,) [rad]."""
         (x, y), c, s = self.ahead, np.cos(azimuths), np.sin(azimuths)
-        return np.stack([c * x - s * y, c * y + s * x], axis=-1)
+        return np.array([c * x - s * y, c * y + s * x]).T
 
     def along(self, ranges: Floats) -> Floats:
         """Distance [m] to the next ring of points, along the ray, at these ranges [m]."""
-        return np.asarray(self.across * np.hypot(ranges, self.height) / self.height)
+        return np.asarray(np.sqrt(ranges**2 + self.height**2) * (self.across / self.height))
 
 
 def starts_of_runs(numbers: Chosen) -> Chosen:

@@ -142,7 +142,7 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
 def _normals(angles: Floats) -> Floats:
     """Normals (2 a, 2) of lines in both directions of a field: at these angles (a,) [rad], then across."""
     c, s = np.cos(angles), np.sin(angles)
-    return np.stack([np.concatenate([c, -s]), np.concatenate([s, c])], axis=1)
+    return np.array([[c, s], [-s, c]]).transpose(0, 2, 1).reshape(-1, 2)
 
 
 _CENTER = round(_FARTHEST / _STEP)
@@ -150,10 +150,10 @@ _BINS = np.floor(np.arcsinh(np.arange(-_CENTER, _CENTER + 1) * _STEP) / _BIN).as
 _BINS += 1 - _BINS[0]  # bin 0 is empty: it divides the rows
 _COUNT = int(_BINS[-1]) + 1
 _TRIED = 0.5 * np.pi / _ANGLES * np.arange(_ANGLES)
-_NORMALS = _normals(_TRIED)
+_NORMALS = _normals(_TRIED).astype(np.float32)
 
 
-def _bins(offsets: Floats) -> Chosen:
+def _bins(offsets: Floats | Singles) -> Chosen:
     """Bins (r, n) of lines at these distances (r, n) [m] from the camera: finer for near lines. Each row has its
     own bins."""
     steps = (offsets * (1.0 / _STEP) + (_CENTER + 0.5)).astype(np.intp)
@@ -163,7 +163,7 @@ def _bins(offsets: Floats) -> Chosen:
 def _main_direction(points: LinePoints) -> float:
     """The direction [rad], from 0 to a right angle, in which most points share a line, or at a right angle to it."""
     some = points.part(slice(None, None, -(-len(points) // _MOST_VOTERS)))
-    bins = _bins(_NORMALS @ some.positions.T)
+    bins = _bins(_NORMALS @ some.positions.T.astype(np.float32))
     votes = np.bincount(bins.ravel(), np.tile(some.weights, len(bins)), len(bins) * _COUNT)
     peaks = (votes.reshape(2, _ANGLES, _COUNT) ** 2).sum(axis=(0, 2))
     best = int(np.argmax(peaks))
@@ -188,7 +188,7 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
     offsets = normals @ points.positions.T
     bins, reach = _bins(offsets), points.tolerance(offsets)
     moments = _moments(points.positions)
-    weights = np.stack([points.weights, points.weights]).astype(np.float64)  # 0 where not free
+    weights = np.array([points.weights, points.weights], dtype=np.float64)  # 0 where not free
     precision = weights / reach**2
     lines: list[_Line] = []
     for _ in range(_MOST_LINES):
@@ -203,16 +203,19 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
         members = np.flatnonzero(on & (weights[0] > 0.0))
         if len(members) >= _FEWEST:
             lines.append(_Line(axis, middle, direction, members))
-        gone = on | near
-        weights[:, gone] = 0.0
-        precision[:, gone] = 0.0
+        left = ~(on | near)
+        weights *= left
+        precision *= left
     return lines
 
 
 def _moments(positions: Floats) -> Floats:
     """1, x, y, x^2, x y and y^2 (6, n) of n places (n, 2)."""
-    x, y = positions.T
-    return np.array([np.ones(len(x)), x, y, x * x, x * y, y * y])
+    moments = np.ones((6, len(positions)))
+    moments[1:3] = positions.T
+    moments[3:5] = moments[1] * moments[1:3]
+    moments[5] = moments[2] ** 2
+    return moments
 
 
 def _fit(
@@ -227,7 +230,7 @@ def _fit(
     ey, ex = normal.tolist()
     ex = -ex
     on = near
-    for _ in range(3):
+    for _ in range(2):
         total, sx, sy, sxx, sxy, syy = (moments @ (precision * on)).tolist()
         if total <= 0.0:
             break
@@ -249,25 +252,29 @@ def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]
     """The pieces of lines that their points speak for."""
     middles, directions = np.array([each.middle for each in lines]), np.array([each.direction for each in lines])
     across = directions[:, ::-1] * (1.0, -1.0)
-    reach = points.tolerance(normals @ points.positions.T).astype(np.float32)
-    off = across.astype(np.float32) @ points.positions.T.astype(np.float32)
+    reach = points.tolerance(normals @ points.positions.T)[[each.axis for each in lines]]
+    places = points.positions.T.astype(np.float32)
+    off = across.astype(np.float32) @ places
     off -= (across * middles).sum(axis=1, dtype=np.float32)[:, None]
-    line, point = np.nonzero(np.abs(off, out=off) < reach[[each.axis for each in lines]])
-    along = ((points.positions[point] - middles[line]) * directions[line]).sum(axis=1)
+    on = np.flatnonzero(np.abs(off, out=off) < reach)
+    along = (directions.astype(np.float32) @ places).ravel()[on]  # [m] from the place next to the camera
+    line = on // len(points)
     order = np.argsort(along + 4.0 * _FARTHEST * line)
-    line, point, along = line[order], point[order], along[order]
+    line, along = line[order], along[order]
+    point = on[order] - len(points) * line
     likely = np.flatnonzero(points.weights > LEAST)
     owner = np.full(len(points), -1)
     for number, each in enumerate(lines):
         owner[likely[each.members]] = number
     is_own = owner[point] == line
+    feet = across * (across * middles).sum(axis=1, keepdims=True)
     values = points.weights[point].astype(np.float64) - _EXPECTED
     pieces = []
     for first, last, support in _best_stretches(values, line, _LEAST_SUPPORT, _MOST_AGAINST):
         part, number = slice(first, last + 1), line[first]
         members = np.searchsorted(likely, point[part][is_own[part]])
         if along[last] - along[first] >= _SHORTEST and len(members) > 1:
-            ends = middles[number] + along[[first, last], None] * directions[number]
+            ends = feet[number] + along[[first, last], None] * directions[number]
             pieces.append(Piece(ends, members, support))
     return pieces
 

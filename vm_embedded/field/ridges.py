@@ -20,7 +20,7 @@ Profiles = Callable[[Floats, int], tuple[Singles, Floats]]
 """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of each stretch (n, 2, 2) [m] on
 the plane, NaN outside of the picture, and the pixels (n,) between two of these places."""
 
-_STATIONS = 12
+_STATIONS = 10
 """Profiles of a piece."""
 
 _AT = (np.arange(_STATIONS) + 0.5) / _STATIONS
@@ -74,7 +74,7 @@ def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Pr
     """
     if not pieces:
         return []
-    ends = np.stack([each.ends for each in pieces])  # (p, 2, 2)
+    ends = np.array([each.ends for each in pieces])  # (p, 2, 2)
     along = ends[:, 1] - ends[:, 0]
     lengths = np.hypot(along[:, 0], along[:, 1])
     normals = along[:, ::-1] * (-1.0, 1.0) / lengths[:, None]
@@ -83,7 +83,7 @@ def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Pr
     aside = reach[:, :, None] * normals[:, None]
     corners = np.concatenate([ends - aside, ends + aside], axis=2)  # (p, 2, 4)
     brightness, pixels = profiles((_SHARES @ corners).reshape(-1, 2, 2), 2 * _HALF + 1)
-    steps = reach.mean(axis=1) / _HALF  # (p,) [m]
+    steps = reach.sum(axis=1) / (2 * _HALF)  # (p,) [m]
     middle = np.sort(pixels.reshape(-1, _STATIONS), axis=1)[:, _STATIONS // 2]
     contrasts = _contrasts(
         brightness.reshape(-1, _STATIONS, 2 * _HALF + 1).transpose(0, 2, 1),
@@ -117,12 +117,12 @@ def _contrasts(brightness: Singles, widths: Floats) -> Singles:
     np.cumsum(np.where(hidden, np.float32(0.0), brightness), axis=1, out=sums[:, 1:])
     samples = np.arange(count)
     # First sample, and the one behind the last, of the left side, the ridge and the right side around each sample.
-    edges = np.stack([-half - 2 * width - 1, -half - width + 1, -half, half + 1, half + width, half + 2 * width + 2])
+    edges = np.array([-half - 2 * width - 1, -half - width + 1, -half, half + 1, half + width, half + 2 * width + 2])
     at = np.clip(edges[:, :, None] + samples, 0, count)  # (6, p, N)
     parts = sums[np.arange(len(widths))[:, None], at]  # (6, p, N, T)
     sizes = np.maximum(at[1::2] - at[::2], 1).astype(np.float32)
     left, ridge, right = (parts[1::2] - parts[::2]) / sizes[..., None]
-    surroundings = sums[:, -1].mean(axis=1) / count + _DARK
+    surroundings = sums[:, -1].sum(axis=1) / (count * brightness.shape[2]) + _DARK
     contrasts = (ridge - np.maximum(left, right)) / surroundings[:, None, None]
     contrasts[hidden | (np.abs(samples - _HALF) > _HALF - (width + half)[:, None])[..., None]] = 0.0
     return np.asarray(np.clip(contrasts, *_LIMITS))
@@ -144,4 +144,4 @@ def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Flo
     best = np.argmax(totals, axis=1)
     near = samples[rows, best][:, None] + np.array([[-1], [0], [1]])  # (p, 3, T): the ridge may weave by a sample
     shown = contrasts[rows[:, None, None], np.clip(near, 0, 2 * _HALF), stations].max(axis=1)
-    return shifts[rows, best], (shown > _CONTRAST).mean(axis=1)
+    return shifts[rows, best], np.count_nonzero(shown > _CONTRAST, axis=1) / _STATIONS
