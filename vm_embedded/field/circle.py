@@ -89,7 +89,7 @@ def _best_circle(points: LinePoints) -> tuple[Floats, float] | None:
     if not possible.any():
         return None
     centers, radii = centers[possible], radii[possible]
-    x, y = (points.positions.T[:, :, None] - centers.T[:, None]).astype(np.float32)  # (n, t)
+    x, y = points.positions.T.astype(np.float32)[:, :, None] - centers.T.astype(np.float32)[:, None]  # (n, t)
     off = np.abs(np.sqrt(x * x + y * y) - radii.astype(np.float32))
     tolerance = 0.04 + 0.6 * points.blur
     best = int(np.argmax(points.weights @ (2.0 * (off < tolerance[:, None]) - (off < 0.5 * radii))))

@@ -252,10 +252,11 @@ def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]
     """The pieces of lines that their points speak for."""
     middles, directions = np.array([each.middle for each in lines]), np.array([each.direction for each in lines])
     across = directions[:, ::-1] * (1.0, -1.0)
+    distances = (across * middles).sum(axis=1, keepdims=True)
     reach = points.tolerance(normals @ points.positions.T)[[each.axis for each in lines]]
     places = points.positions.T.astype(np.float32)
     off = across.astype(np.float32) @ places
-    off -= (across * middles).sum(axis=1, dtype=np.float32)[:, None]
+    off -= distances.astype(np.float32)
     on = np.flatnonzero(np.abs(off, out=off) < reach)
     along = (directions.astype(np.float32) @ places).ravel()[on]  # [m] from the place next to the camera
     line = on // len(points)
@@ -266,17 +267,19 @@ def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]
     owner = np.full(len(points), -1)
     for number, each in enumerate(lines):
         owner[likely[each.members]] = number
-    is_own = owner[point] == line
-    feet = across * (across * middles).sum(axis=1, keepdims=True)
+    own = np.flatnonzero(owner[point] == line)
+    members = np.searchsorted(likely, point[own])
     values = points.weights[point].astype(np.float64) - _EXPECTED
-    pieces = []
-    for first, last, support in _best_stretches(values, line, _LEAST_SUPPORT, _MOST_AGAINST):
-        part, number = slice(first, last + 1), line[first]
-        members = np.searchsorted(likely, point[part][is_own[part]])
-        if along[last] - along[first] >= _SHORTEST and len(members) > 1:
-            ends = feet[number] + along[[first, last], None] * directions[number]
-            pieces.append(Piece(ends, members, support))
-    return pieces
+    stretches = _best_stretches(values, line, _LEAST_SUPPORT, _MOST_AGAINST)
+    spans = np.array([each[:2] for each in stretches], dtype=np.intp).reshape(-1, 2)
+    feet = across * distances
+    ends = feet[line[spans]] + along[spans][..., None] * directions[line[spans]]
+    bounds = np.searchsorted(own, spans + (0, 1)).tolist()
+    pieces = (
+        Piece(its_ends, members[first:end], support)
+        for its_ends, (first, end), (_, _, support) in zip(ends, bounds, stretches, strict=True)
+    )
+    return [each for each in pieces if each.length >= _SHORTEST and len(each.members) > 1]
 
 
 def _best_stretches(values: Floats, groups: Chosen, least: float, lost: float) -> list[tuple[int, int, float]]:

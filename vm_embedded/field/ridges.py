@@ -27,7 +27,7 @@ _AT = (np.arange(_STATIONS) + 0.5) / _STATIONS
 _SHARES = np.stack([1.0 - _AT, _AT], axis=1)
 """Shares (T, 2) of the two ends of a piece in the place of each profile."""
 
-_HALF = 20
+_HALF = 16
 """Samples of a profile on each side of the piece."""
 
 _MARGIN = 0.12
