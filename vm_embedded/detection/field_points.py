@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Floats, Singles
+from ..arrays import Floats
 from ..field.features import FieldFeatures
 from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundPoints
@@ -47,26 +47,25 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
 def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
     view, classes = observation.view, observation.manifest.classes
-    rays, probabilities = observation.layout.rays.T, observation.slot_probabilities.T
-    slots = observation.shown[rays[2, observation.shown] < -_LOWEST]
-    slots = slots[np.argsort(rays[2, slots], kind="stable")]  # the mesh is nearly in this order
-    positions = rays[:2, slots]
-    positions *= -view.height / rays[2, slots]
-    outside = np.zeros(len(slots), np.float32)
-    named: dict[str, Singles] = {}
-    for row, each in zip(probabilities, classes, strict=True):
-        if each.kind == "background" or each.name in ROLES:
-            values = np.fmax(row[slots], 0.0)  # 0 for NaN: one NaN would spoil the sums of all others
-            if each.kind == "background":
-                outside += values
-            if each.name in ROLES:
-                named[each.name] = values
+    rays = observation.layout.rays.T
+    upward = rays[2, observation.shown]
+    order = np.argsort(upward, kind="stable")  # the mesh is nearly in this order
+    order = order[: np.searchsorted(upward, -_LOWEST, sorter=order)]
+    slots, scale = observation.shown[order], -view.height / upward[order]
+    positions = np.array([rays[0, slots] * scale, rays[1, slots] * scale])
+    columns = [  # 0 for NaN: one NaN would spoil the sums of all others
+        (each, np.fmax(column[slots], 0.0))
+        for each, column in zip(classes, observation.slot_probabilities.T, strict=True)
+        if each.kind == "background" or each.name in ROLES
+    ]
     return GroundPoints(
         positions=(view.heading[:2, :2] @ positions).T,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
-        classes=named,
-        outside=outside,
+        classes={each.name: column for each, column in columns if each.name in ROLES},
+        outside=sum(
+            (column for each, column in columns if each.kind == "background"), np.zeros(len(slots), np.float32)
+        ),
         ahead=view.heading[:2, 0],
     )
 

@@ -85,21 +85,16 @@ def _hulls(places: Floats) -> list[list[int]]:
     """The hull of places (c, 2) from right to left, and others, each without a corner of the one before: the one that
     is farthest beyond the places beside it."""
     numbers = _complex(places)
-    ranges = [abs(each) for each in numbers]
-    left = list(range(len(places)))
+    left, ranges = list(range(len(places))), list(map(abs, numbers))
     hulls = [_hull(numbers, left)]
     while len(hulls) < _MOST_HULLS and len(left) > _FEWEST_PLACES:
-        corners, most, at = hulls[-1], 0.0, 0
-        for number, corner in enumerate(corners):
-            where = bisect_left(left, corner)
-            beside = ranges[left[where - 1 if where else 0]] + ranges[left[where + 1 - (where + 1 == len(left))]]
-            if ranges[corner] > most * beside:
-                most, at = ranges[corner] / beside, number
-        del left[bisect_left(left, corners[at])]
-        # The hull changes only between the corners beside the one that is gone.
-        first = bisect_left(left, corners[at - 1]) if at else 0
-        last = bisect_left(left, corners[at + 1]) + 1 if at + 1 < len(corners) else len(left)
-        hulls.append([*corners[: max(at - 1, 0)], *_hull(numbers, left[first:last]), *corners[at + 2 :]])
+        corners, sides = hulls[-1], [ranges[0], *ranges, ranges[-1]]
+        where = [bisect_left(left, corner) for corner in corners]
+        beyond = [ranges[each] / (sides[each] + sides[each + 2]) for each in where]
+        at = beyond.index(max(beyond))
+        del left[where[at]], ranges[where[at]]
+        edges = [0, *where, len(places)]  # the hull changes only between the corners beside the one that is gone
+        hulls.append([*corners[: max(at - 1, 0)], *_hull(numbers, left[edges[at] : edges[at + 2]]), *corners[at + 2 :]])
     return hulls
 
 
@@ -131,8 +126,7 @@ def _beyond(places: Floats, hulls: Sequence[Sequence[int]]) -> Floats:
     """
     first, last = np.array([piece for corners in hulls for piece in pairwise(corners)]).T
     (x, y), (along_x, along_y) = places[first].T, (places[last] - places[first]).T
-    # The ray t * place meets the line through a piece where the cross product of (t * place - start) and `along` is
-    # zero.
+    # The ray t * place meets the line through a piece where (t * place - start) x along is 0.
     lines = np.array([along_y, -along_x]) / (x * along_y - y * along_x)
     counts = [count for corners in hulls for count in _counts(len(places), corners)]
     x, y = np.repeat(lines, counts, axis=1).reshape(2, len(hulls), -1)

@@ -49,27 +49,16 @@ class _Line(NamedTuple):
         return [way for way, rest in ((self.way, self.length - t), (-self.way, t)) if rest > beyond]
 
 
-class _Meeting(NamedTuple):
-    """Where two lines meet: the place, the arms of both lines, and its confidence. behind: two places that the frame
-    must show to be sure that a line ends."""
-
-    place: complex
-    arms: tuple[list[complex], list[complex]]
-    confidence: float
-    behind: tuple[complex, complex]
-
-
 def find_crossings(lines: Sequence[Segment], shown: Shown) -> tuple[Crossing, ...]:
     """Crossings of all pairs of lines. There is none where its kind is not clear: where the frame ends behind
     the end of a line, or where lines of several pieces meet."""
-    meetings = [_meeting(*pair) for pair in combinations(_without_duplicates(lines), 2)]
-    found = [each for each in meetings if each is not None]
+    found = [each for pair in combinations(_without_duplicates(lines), 2) for each in _crossing(*pair)]
     if not found:
         return ()
-    behind = np.array([each.behind for each in found]).ravel()
-    complete = shown(np.stack([behind.real, behind.imag], axis=1)).reshape(-1, 2).all(axis=1)
-    sure = [each for each, whole in zip(found, complete.tolist(), strict=True) if whole]
-    return tuple(_described(each) for each in sure if _is_alone(each, sure))
+    behind = np.array([each for _, each in found]).ravel()
+    complete = np.all(shown(np.array([behind.real, behind.imag]).T).reshape(-1, 2), axis=1).tolist()
+    crossings = [each for (each, _), whole in zip(found, complete, strict=True) if whole]
+    return tuple(each for each in crossings if _is_alone(each, crossings))
 
 
 def _without_duplicates(segments: Sequence[Segment]) -> list[_Line]:
@@ -97,33 +86,31 @@ def _without_duplicates(segments: Sequence[Segment]) -> list[_Line]:
     return kept
 
 
-def _meeting(one: _Line, other: _Line) -> _Meeting | None:
-    """Where two lines meet at a right angle; None if they don't."""
+def _crossing(one: _Line, other: _Line) -> list[tuple[Crossing, tuple[complex, complex]]]:
+    """The crossing of two lines, if there is one, and two places that the frame must show to be sure that they end."""
     sine = (one.way.conjugate() * other.way).imag
     if abs(sine) < _LEAST_SINE:
-        return None
+        return []
     between = (other.start - one.start).conjugate()
     t, u = (between * other.way).imag / sine, (between * one.way).imag / sine  # [m] along both
     place = one.start + t * one.way
-    larger = _LARGER * abs(place)
-    gap = max(-t, t - one.length, -u, u - other.length, 0.0) / (_MISSING + larger)  # of a line in front of the other
-    arms = one.arms(t, _MARGIN + larger), other.arms(u, _MARGIN + larger)
-    if gap >= 1.0 or not all(arms):
-        return None
-    first, second = (place - own[0] * (_MARGIN + larger) if len(own) == 1 else place for own in arms)
-    return _Meeting(place, arms, one.confidence * other.confidence * (1.0 - _GAP_COST * gap), (first, second))
+    beyond, missing = (each + _LARGER * abs(place) for each in (_MARGIN, _MISSING))
+    gap = max(-t, t - one.length, -u, u - other.length, 0.0) / missing  # of a line in front of the other
+    arms = sorted([one.arms(t, beyond), other.arms(u, beyond)], key=len)
+    if gap >= 1.0 or not arms[0]:
+        return []
+    kind = {2: "L", 3: "T", 4: "X"}[len(arms[0]) + len(arms[1])]
+    heading = cmath.phase(arms[0][0] + arms[1][0] if kind == "L" else arms[0][0])
+    crossing = Crossing(
+        kind,
+        np.array([place.real, place.imag]),
+        heading % (0.5 * math.pi) if kind == "X" else heading,
+        one.confidence * other.confidence * (1.0 - _GAP_COST * gap),
+    )
+    first, second = (place - own[0] * beyond if len(own) == 1 else place for own in arms)
+    return [(crossing, (first, second))]
 
 
-def _is_alone(meeting: _Meeting, others: Sequence[_Meeting]) -> bool:
+def _is_alone(crossing: Crossing, others: Sequence[Crossing]) -> bool:
     """Whether no other crossing is at the same place. Of a line in two pieces, each makes one, and none is right."""
-    return sum(abs(each.place - meeting.place) < 2.0 * _MARGIN for each in others) == 1
-
-
-def _described(meeting: _Meeting) -> Crossing:
-    one, other = meeting.arms
-    position = np.array([meeting.place.real, meeting.place.imag])
-    if len(one) == len(other) == 2:
-        return Crossing("X", position, cmath.phase(one[0]) % (0.5 * math.pi), meeting.confidence)
-    if len(one) == len(other) == 1:
-        return Crossing("L", position, cmath.phase(one[0] + other[0]), meeting.confidence)
-    return Crossing("T", position, cmath.phase(one[0] if len(one) == 1 else other[0]), meeting.confidence)
+    return sum(math.dist(each.position, crossing.position) < 2.0 * _MARGIN for each in others) == 1

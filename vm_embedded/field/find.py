@@ -43,7 +43,7 @@ def find_features(
         for name, rules in (("goal", POST), ("robot", ROBOT))
     }
     near = line_points(points)
-    likely = near.part(near.weights > LEAST)
+    likely = near.part(np.flatnonzero(near.weights > LEAST))
     pieces, circle = _straight_and_round(near, likely)
     pieces = pieces_on_ridges(pieces, points, profiles)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))

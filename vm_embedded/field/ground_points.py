@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from ..arrays import Chosen, Floats, Singles
 
@@ -41,7 +44,7 @@ class GroundPoints:
         """Direction (n,) [rad] on the plane, counterclockwise from `ahead`: -pi and pi are behind the camera."""
         x, y = self.ahead
         ahead, left = np.array([[x, y], [-y, x]]) @ self.positions.T
-        return np.arctan2(left.astype(np.float32), ahead.astype(np.float32)).astype(np.float64)
+        return np.asarray(np.arctan2(left.astype(np.float32), ahead.astype(np.float32)), dtype=np.float64)
 
     def directions(self, azimuths: Floats) -> Floats:
         """Unit vectors (m, 2) at azimuths (m,) [rad]."""
@@ -53,7 +56,7 @@ class GroundPoints:
         return np.asarray(np.sqrt(ranges**2 + self.height**2) * (self.across / self.height))
 
 
-def starts_of_runs(numbers: Chosen) -> Chosen:
+def starts_of_runs(numbers: npt.NDArray[np.number[Any]]) -> Chosen:
     """Positions in numbers (n,), at least one, where runs of equal numbers start."""
     return np.flatnonzero(np.concatenate([[True], numbers[1:] != numbers[:-1]]))
 

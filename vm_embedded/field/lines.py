@@ -93,7 +93,7 @@ class LinePoints:
         the camera along the line's normal."""
         return tolerance(np.abs(offsets) / self.ranges, self.blur, self.across)
 
-    def part(self, chosen: Mask | Chosen | slice) -> LinePoints:
+    def part(self, chosen: Chosen | slice) -> LinePoints:
         """Some of the points."""
         return LinePoints(
             self.positions[chosen], self.weights[chosen], self.ranges[chosen], self.blur[chosen], self.across
@@ -146,10 +146,10 @@ def _normals(angles: Floats) -> Floats:
 
 
 _CENTER = round(_FARTHEST / _STEP)
-_BINS = np.floor(np.arcsinh(np.arange(-_CENTER, _CENTER + 1) * _STEP) / _BIN).astype(np.intp)
-_BINS += 1 - _BINS[0]  # bin 0 is empty: it divides the rows
+_REACH = np.arcsinh(np.arange(-_CENTER, _CENTER + 1) * _STEP)
+_BINS = np.floor((_REACH - _REACH[0]) / _BIN).astype(np.intp) + 1  # bin 0 is empty: it divides the rows
 _COUNT = int(_BINS[-1]) + 1
-_TRIED = 0.5 * np.pi / _ANGLES * np.arange(_ANGLES)
+_TRIED = np.arange(_ANGLES, dtype=np.float64) * (0.5 * math.pi / _ANGLES)
 _NORMALS = _normals(_TRIED).astype(np.float32)
 
 
@@ -174,8 +174,7 @@ def _main_direction(points: LinePoints) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Line:
-    """A fitted line: the number of its normal, a point of it (2,) [m], its direction (2,), and the numbers of its
-    likely points."""
+    """A fitted line: the number of its normal, a point [m], its direction, and the numbers of its likely points."""
 
     axis: int
     middle: tuple[float, float]
@@ -227,9 +226,7 @@ def _fit(
     reach (n,): how far a point may be from the line [m]. near (n,): the points to begin with. normal (2,): the expected
     normal.
     """
-    ey, ex = normal.tolist()
-    ex = -ex
-    on = near
+    ex, ey, on = -float(normal[1]), float(normal[0]), near  # the expected direction
     for _ in range(2):
         total, sx, sy, sxx, sxy, syy = (moments @ (precision * on)).tolist()
         if total <= 0.0:
@@ -274,7 +271,7 @@ def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]
     spans = np.array([each[:2] for each in stretches], dtype=np.intp).reshape(-1, 2)
     feet = across * distances
     ends = feet[line[spans]] + along[spans][..., None] * directions[line[spans]]
-    bounds = np.searchsorted(own, spans + (0, 1)).tolist()
+    bounds = np.searchsorted(own, spans + np.array([0, 1])).tolist()
     pieces = (
         Piece(its_ends, members[first:end], support)
         for its_ends, (first, end), (_, _, support) in zip(ends, bounds, stretches, strict=True)

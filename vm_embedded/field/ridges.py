@@ -20,7 +20,7 @@ Profiles = Callable[[Floats, int], tuple[Singles, Floats]]
 """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of each stretch (n, 2, 2) [m] on
 the plane, NaN outside of the picture, and the pixels (n,) between two of these places."""
 
-_STATIONS = 10
+_STATIONS = 12
 """Profiles of a piece."""
 
 _AT = (np.arange(_STATIONS) + 0.5) / _STATIONS

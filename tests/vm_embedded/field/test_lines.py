@@ -35,7 +35,7 @@ def near(lines=(), circle=None, angle=0.0, seed=None):
 def drawn(*args, **keywords):
     """Those of these points that are on lines."""
     points = near(*args, **keywords)
-    return points.part(points.weights > LEAST)
+    return points.part(np.flatnonzero(points.weights > LEAST))
 
 
 def pieces_of(*args, **keywords):
