@@ -9,8 +9,8 @@ hulls with fewer corners are tried, too, and the one that most places agree with
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from itertools import islice, pairwise
 
 import numpy as np
 
@@ -22,9 +22,6 @@ _COLUMN = 0.04
 
 _FEWEST = 2.0
 """A column shows the border only if so many points behind it are outside, and so many in front are of the field."""
-
-_FEWEST_PLACES = 3
-"""A border has at least so many places."""
 
 _AGREES = 0.03
 """A place agrees with a border if they differ by less than this share of the distance, or by less than the mesh can
@@ -42,10 +39,10 @@ def find_border(points: GroundPoints) -> Floats:
     if not len(points.ranges):
         return np.empty((0, 2))
     places, ended = _ends_of_field(points)
-    if np.count_nonzero(ended) < _FEWEST_PLACES:
+    if np.count_nonzero(ended) < 3:
         return np.empty((0, 2))
     limit = max(_AGREES, points.across / points.height)
-    hulls = _hulls(places)
+    hulls = list(islice(_hulls(places), _MOST_HULLS))
     beyond = _beyond(places, hulls)
     agreeing = np.count_nonzero(np.abs(beyond) < limit, axis=1).tolist()
     best = 0
@@ -81,21 +78,23 @@ def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
     return points.directions(azimuths) * far[:, None], best - sums[final] >= _FEWEST
 
 
-def _hulls(places: Floats) -> list[list[int]]:
+def _hulls(places: Floats) -> Iterator[list[int]]:
     """The hull of places (c, 2) from right to left, and others, each without a corner of the one before: the one that
     is farthest beyond the places beside it."""
-    numbers = _complex(places)
+    numbers = list(map(complex, *places.T.tolist()))
     left, ranges = list(range(len(places))), list(map(abs, numbers))
-    hulls = [_hull(numbers, left)]
-    while len(hulls) < _MOST_HULLS and len(left) > _FEWEST_PLACES:
-        corners, sides = hulls[-1], [ranges[0], *ranges, ranges[-1]]
+    corners = _hull(numbers, left)
+    yield corners
+    while len(left) > 3:
+        sides = [ranges[0], *ranges, ranges[-1]]
         where = [bisect_left(left, corner) for corner in corners]
         beyond = [ranges[each] / (sides[each] + sides[each + 2]) for each in where]
         at = beyond.index(max(beyond))
         del left[where[at]], ranges[where[at]]
         edges = [0, *where, len(places)]  # the hull changes only between the corners beside the one that is gone
-        hulls.append([*corners[: max(at - 1, 0)], *_hull(numbers, left[edges[at] : edges[at + 2]]), *corners[at + 2 :]])
-    return hulls
+        between = _hull(numbers, left[edges[at] : edges[at + 2]])
+        corners = [*corners[: max(at - 1, 0)], *between, *corners[at + 2 :]]
+        yield corners
 
 
 def _hull(places: Sequence[complex], numbers: Sequence[int]) -> list[int]:
@@ -112,11 +111,6 @@ def _hull(places: Sequence[complex], numbers: Sequence[int]) -> list[int]:
             corners.pop()
         corners.append(number)
     return corners
-
-
-def _complex(places: Floats) -> list[complex]:
-    """Places (c, 2) as complex numbers."""
-    return list(map(complex, *places.T.tolist()))
 
 
 def _beyond(places: Floats, hulls: Sequence[Sequence[int]]) -> Floats:
@@ -151,12 +145,12 @@ def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, beyond: Floats
     run = np.cumsum(np.append(kept[:1], kept[1:] != kept[:-1]))
     support = np.bincount(run, np.where(kept, agreeing, 0))
     longest = int(np.argmax(support))
-    if support[longest] < _FEWEST_PLACES:
+    if support[longest] < 3:
         return np.empty((0, 2))
     pieces = np.flatnonzero(run == longest)
     part = slice(pieces[0], pieces[-1] + 2)
     moved = _without_margin(places, corners, beyond, agrees)[part]
-    outer = _hull(_complex(moved), range(len(moved)))  # each corner moved on its own, so some may point inward now
+    outer = next(_hulls(moved))  # each corner moved on its own, so some may point inward now
     return np.asarray(moved[outer] * (1.0 + _beyond(moved, [outer]).mean()))
 
 

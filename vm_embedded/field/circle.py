@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Chosen, Floats
-from .ground_points import cross
 from .lines import LinePoints
 
 _TRIES = 300
@@ -99,7 +98,7 @@ def _best_circle(points: LinePoints) -> tuple[Floats, float] | None:
 def _through(triples: Floats) -> tuple[Floats, Floats]:
     """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); NaN for points in a row."""
     a, b = triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0]
-    area = 2.0 * cross(a, b)
+    area = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     area[np.abs(area) < 1e-6] = np.nan
     aa, bb = (a**2).sum(axis=1), (b**2).sum(axis=1)
     x = (b[:, 1] * aa - a[:, 1] * bb) / area

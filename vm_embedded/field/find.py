@@ -101,11 +101,7 @@ def _straight_and_round(points: LinePoints, likely: LinePoints) -> tuple[list[Pi
     if circle is not None:
         on = np.zeros(len(likely), dtype=bool)
         on[circle.members] = True
-        pieces = [
-            each
-            for each in pieces
-            if each.length >= 2.0 * circle.radius or np.count_nonzero(on[each.members]) < 0.5 * len(each.members)
-        ]
+        pieces = [each for each in pieces if each.length >= 2.0 * circle.radius or on[each.members].mean() < 0.5]
     return pieces, circle
 
 

@@ -59,8 +59,3 @@ class GroundPoints:
 def starts_of_runs(numbers: npt.NDArray[np.number[Any]]) -> Chosen:
     """Positions in numbers (n,), at least one, where runs of equal numbers start."""
     return np.flatnonzero(np.concatenate([[True], numbers[1:] != numbers[:-1]]))
-
-
-def cross(a: Floats, b: Floats) -> Floats:
-    """Cross product (...,) of vectors (..., 2) on the plane: positive if b is to the left of a."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -186,7 +186,9 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
     """Lines across two normals (2, 2), each fitted to likely points that no line before has."""
     offsets = normals @ points.positions.T
     bins, reach = _bins(offsets), points.tolerance(offsets)
-    moments = _moments(points.positions)
+    moments = np.ones((6, len(points)))  # 1, x, y, x^2, x y and y^2
+    moments[1:3] = points.positions.T
+    moments[3:5], moments[5] = moments[1] * moments[1:3], moments[2] ** 2
     weights = np.array([points.weights, points.weights], dtype=np.float64)  # 0 where not free
     precision = weights / reach**2
     lines: list[_Line] = []
@@ -206,15 +208,6 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
         weights *= left
         precision *= left
     return lines
-
-
-def _moments(positions: Floats) -> Floats:
-    """1, x, y, x^2, x y and y^2 (6, n) of n places (n, 2)."""
-    moments = np.ones((6, len(positions)))
-    moments[1:3] = positions.T
-    moments[3:5] = moments[1] * moments[1:3]
-    moments[5] = moments[2] ** 2
-    return moments
 
 
 def _fit(

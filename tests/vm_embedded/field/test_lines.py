@@ -119,6 +119,13 @@ def test_scattered_points_are_no_circle():
     assert find_circle(points, np.arange(len(points))) is None
 
 
+def test_a_few_points_are_no_circle():
+    points = drawn(circle=(np.array([2.0, 0.0]), 0.75))
+    few = np.linspace(0, len(points) - 1, 17).astype(np.intp)
+    assert find_circle(points, np.arange(len(points))) is not None
+    assert find_circle(points.part(few), np.arange(len(few))) is None
+
+
 def test_the_same_points_have_the_same_circle():
     points = drawn([((0.5, 0.0), (5.0, 0.0))], circle=(np.array([2.0, 0.0]), 0.75))
     off_the_line = np.flatnonzero(np.abs(points.positions[:, 1]) > 0.1)
