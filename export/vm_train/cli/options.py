@@ -16,7 +16,6 @@ from .import_boxes import import_boxes_parser
 from .import_pictures import import_parser
 from .look import look_config_parser, look_parser
 from .shards import shards_parser
-from .stream_options import add_stream
 
 _EPILOG = """\
 other commands (add --help for their options):
@@ -164,7 +163,6 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         help="cache of decoded pictures; default RUN/unpacked",
     )
     cache.add_argument("--no-unpacked", action="store_true", help="no such cache; for slow or small disks")
-    add_stream(group)
 
 
 def _add_hardware(made: argparse.ArgumentParser) -> None:
