@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +15,8 @@ from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import projection_named
 
-from .tfexample import BytesList, Example, FloatList
+from ..data.picture_files import FileName
+from .tfexample import parse_example
 
 KEYS = (
     "image",
@@ -51,23 +53,22 @@ class ExamplePicture:
     mask: bytes
     lens: str
 
-    def files(self, number: int) -> dict[str, bytes]:
-        """The files' contents by name. The image is last: an import writes it when the others are complete."""
-        return {
-            f"mask{number:07d}.png": self.mask,
-            f"lens{number:07d}.yaml": self.lens.encode(),
-            f"image{number:07d}{self.suffix}": self.image,
-        }
+    def files(self, number: int) -> Iterator[tuple[FileName, bytes]]:
+        """The files' names and contents. The image is last: an import writes it when the others are complete."""
+        yield FileName("mask", f"{number:07d}", ".png"), self.mask
+        yield FileName("lens", f"{number:07d}", ".yaml"), self.lens.encode()
+        yield FileName("image", f"{number:07d}", self.suffix), self.image
 
 
-def picture_of(example: Example, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:
-    """The picture in an Example.
+def picture_of(payload: bytes, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:
+    """The picture in an Example, the payload of a record.
 
     renaming: the Example's names of features, by our names in KEYS. normalized: the Example gives focal length, center
     and k for an image of width 1, not in pixels. Raises WrongUnitError if the focal length is in the other unit, and
     another VisualMeshError, naming the feature, for anything else that makes the Example unusable.
     """
-    features = _Features(example, {key: renaming.get(key, key) for key in KEYS})
+    found = parse_example(payload).features.feature
+    features = _Features(found, {key: renaming.get(key, key) for key in KEYS})
     image, suffix, size = features.picture("image", cv2.IMREAD_COLOR)
     mask, mask_suffix, mask_size = features.picture("mask", cv2.IMREAD_UNCHANGED)
     if mask_suffix != ".png":
@@ -88,7 +89,7 @@ class _Features:
     The methods take our names and raise a VisualMeshError that names the feature.
     """
 
-    example: Example
+    example: Mapping[str, Any]
     names: Mapping[str, str]
 
     def __post_init__(self) -> None:
@@ -103,16 +104,16 @@ class _Features:
             )
 
     def text(self, key: str) -> bytes:
-        feature = self.example[self.names[key]]
-        if not isinstance(feature, BytesList) or len(feature.values) != 1:
+        values: tuple[bytes, ...] = tuple(self.example[self.names[key]].bytes_list.value)
+        if len(values) != 1:
             raise InputError(f"{key} is not one string of bytes")
-        return feature.values[0]
+        return values[0]
 
     def floats(self, key: str, count: int) -> tuple[float, ...]:
-        feature = self.example[self.names[key]]
-        if not isinstance(feature, FloatList) or len(feature.values) != count:
+        values = tuple(self.example[self.names[key]].float_list.value)
+        if len(values) != count:
             raise InputError(f"{key} is not {count} floats")
-        return feature.values
+        return values
 
     def picture(self, key: str, flags: int) -> tuple[bytes, str, tuple[int, int]]:
         """The bytes of an image file, its suffix, and its width and height [px]. flags: of cv2.imdecode."""
