@@ -11,7 +11,6 @@ from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, unknown
 
-from ..formats.importing import RecordRules, import_pictures
 from ..formats.picture_example import KEYS
 
 _SHOWN = 20
@@ -62,6 +61,8 @@ def _renamed(text: str) -> tuple[str, str]:
 
 def run_import(options: argparse.Namespace) -> int:
     """Import as the options say and return the exit status. Raises InputError, also if no picture was imported."""
+    from ..formats.importing import RecordRules, import_pictures
+
     rules = RecordRules(dict(options.key), options.normalized)
     bar = ProgressBar(100)
     try:

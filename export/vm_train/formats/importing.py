@@ -17,6 +17,7 @@ from vm_embedded.errors import InputError, VisualMeshError, unknown
 from .picture_example import KEYS, WrongUnitError, picture_of
 from .picture_folder import PictureFolder
 from .shards import import_shard, is_shard
+from .tfexample import parse_example
 from .tfrecord import read_records
 
 
@@ -83,7 +84,7 @@ def _import_records(
     for record in read_records(path):
         number = next(numbers)
         try:
-            found = picture_of(record.payload, rules.renaming, rules.normalized)
+            found = picture_of(parse_example(record.payload), rules.renaming, rules.normalized)
         except VisualMeshError as error:
             fault = f"{record.where}: {error}"
             if skipped is None or isinstance(error, WrongUnitError):

@@ -16,7 +16,6 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import projection_named
 
 from ..data.picture_files import FileName
-from .tfexample import parse_example
 
 KEYS = (
     "image",
@@ -60,15 +59,14 @@ class ExamplePicture:
         yield FileName("image", f"{number:07d}", self.suffix), self.image
 
 
-def picture_of(payload: bytes, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:
-    """The picture in an Example, the payload of a record.
+def picture_of(example: Any, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:
+    """The picture in an Example.
 
     renaming: the Example's names of features, by our names in KEYS. normalized: the Example gives focal length, center
     and k for an image of width 1, not in pixels. Raises WrongUnitError if the focal length is in the other unit, and
     another VisualMeshError, naming the feature, for anything else that makes the Example unusable.
     """
-    found = parse_example(payload).features.feature
-    features = _Features(found, {key: renaming.get(key, key) for key in KEYS})
+    features = _Features(example.features.feature, {key: renaming.get(key, key) for key in KEYS})
     image, suffix, size = features.picture("image", cv2.IMREAD_COLOR)
     mask, mask_suffix, mask_size = features.picture("mask", cv2.IMREAD_UNCHANGED)
     if mask_suffix != ".png":

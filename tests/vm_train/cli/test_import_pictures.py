@@ -15,7 +15,7 @@ def test_the_command_imports_and_names_what_it_skipped(tmp_path, capsys):
     out = str(tmp_path / "out")
     assert run_import(import_parser().parse_args([str(path), out, "--key", "lens/fov=theirs"])) == 0
     said = capsys.readouterr()
-    assert said.out == f"{out}: 1 pictures imported, 1 records skipped\n"
+    assert said.out == f"{out}: 1 pictures imported, 1 skipped\n"
     assert said.err.startswith(f"vm-train: skipped {path}: record 1: lacks mask, lens/fov (as 'theirs'); it has 'Hoc'")
 
 
@@ -25,7 +25,7 @@ def test_the_command_shows_the_first_faults_only_and_fails_if_nothing_was_import
         run_import(import_parser().parse_args([str(path), str(tmp_path / "out")]))
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 21
-    assert said[-1] == "vm-train: skipped 3 more records"
+    assert said[-1] == "vm-train: skipped 3 more"
 
 
 @pytest.mark.parametrize(
