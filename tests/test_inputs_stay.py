@@ -45,7 +45,6 @@ vm-train check boxes --boxes --sheet boxes/a.jpg
 vm-train check frames --boxes --json data.yaml
 vm-train preview data -o data/image0000.jpg
 vm-train rate data --plot data/mask0000.png
-vm-train shards data data
 vm-evaluate ball-small data --list report/field.csv -o report
 vm-evaluate calibrate model.onnx data -o model.onnx
 """.splitlines()

@@ -133,7 +133,7 @@ def _add_data(made: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="DATA",
-        help="folder of imageX.jpg or .png, maskX.png and lensX.yaml, or of shards",
+        help="folder of imageX.jpg or .png, maskX.png and lensX.yaml",
     )
 
 
