@@ -18,10 +18,9 @@ from vm_workstation.stopping import stoppable
 
 from .evaluate_boxes import run_boxes
 from .evaluate_calibrate import run_calibrate
-from .evaluate_options import boxes_parser, calibrate_parser, points_parser
+from .evaluate_options import boxes_parser, calibrate_parser
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
-from .evaluate_points import run_points
 from .evaluating import detector_settings, evaluate_with_progress, other_radii
 
 if TYPE_CHECKING:
@@ -39,8 +38,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stoppable():
             if given[:1] == ["calibrate"]:
                 return run_calibrate(calibrate_parser().parse_args(given[1:]))
-            if given[:1] == ["points"]:
-                return run_points(points_parser().parse_args(given[1:]))
             if any(each.partition("=")[0] == "--boxes" for each in given):
                 asks = {"-h", "--help"}.intersection(given)  # --boxes alone would want its folder first
                 return run_boxes(boxes_parser().parse_args(["--help"] if asks else given))
