@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
         "--camera",
         metavar="SOURCE",
         help="files, each frame once: an image, a folder or glob of images, a video, or a bag of ROS 2; or a live "
-        "camera: its number or device, an http, https or rtsp address, gstreamer:PIPELINE, synthetic, or fault:SCRIPT",
+        "camera: its number or device, an http, https or rtsp address, gstreamer:PIPELINE, or synthetic",
     )
     parser.add_argument(
         "--live", action="store_true", help="play files like a live camera: at their frame rate, skipping late frames"
