@@ -16,7 +16,7 @@ import api_page
 
 from vm_calibrate import cli as calibrate
 from vm_embedded.cli import bench, detect, doctor
-from vm_embedded.cli.program import PrintCompletion
+from vm_embedded.cli.program import PrintAllHelp, PrintCompletion
 from vm_embedded.output.message_schema import message_schema
 from vm_export import cli as export
 from vm_label import cli as label
@@ -26,7 +26,7 @@ from vm_synth import cli as synth
 from vm_train.cli import evaluate
 from vm_train.cli import options as train
 
-_ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintCompletion)
+_ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintAllHelp, PrintCompletion)
 """Options that all programs have."""
 
 DOCS = Path(__file__).parent
@@ -54,7 +54,8 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 def command_line() -> str:
     """The page of the command line."""
     made = (
-        "Made from the help texts of the programs by `make site`. `--help` prints the same, `--version` the version, "
+        "Made from the help texts of the programs by `make site`. `--help` prints the usual options, `--help-all` all, "
+        "`--version` the version, "
         "and `--completion` the script that completes options in bash."
     )
     parts = [f"# Command line\n\n{made}\n"]

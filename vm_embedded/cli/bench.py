@@ -27,7 +27,7 @@ from .options import ANGLES, add_model, add_pose, add_settings, read_options
 from .program import EXIT_OK, Parser, complain, program, run_or_complain
 from .progress import ProgressBar
 from .tuning import fastest_settings
-from .workload import Workload, make_workload
+from .workload import SWAY, SWING, Workload, make_workload
 
 _TUNING_FRAMES = 300
 """Ten seconds: in a shorter walk most calls are cold."""
@@ -51,10 +51,6 @@ def parser() -> argparse.ArgumentParser:
         "--size", metavar="WxH", help="size of the drawn field [px]; default: that of the lens file, or 1280x1024"
     )
     work.add_argument("--frames", type=int, default=900, metavar="N", help="frames to measure, at 30 Hz; default 900")
-    work.add_argument(
-        "--swing", default="10deg", metavar="ANGLE", help="swing of pitch and roll to both sides; default 10deg"
-    )
-    work.add_argument("--sway", default="0.03", metavar="M", help="sway of the height up and down [m]; default 0.03")
     work.add_argument(
         "--up-to",
         type=int,
@@ -166,8 +162,8 @@ def _figures(model: ModelFile, work: Workload, detectors: Sequence[Detector], ru
             "height_m": work.middle.height,
             "pitch_rad": work.middle.pitch,
             "roll_rad": work.middle.roll,
-            "swing_rad": work.swing,
-            "sway_m": work.sway,
+            "swing_rad": SWING,
+            "sway_m": SWAY,
         },
         "operations_per_point": operations,
         "sgemm_gflops": round(rate / 1e9, 1),

@@ -70,7 +70,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     options.model = model_path(options.model)
     settings = detector_settings(options)
     pictures = select_pictures(options.data, options.list, options.part)
-    rules = Rules(options.radius_of, options.min_radius, options.strict)
+    rules = Rules(options.radius_of, options.strict)
     check_evaluation_folder(options.output, (options.model, options.list, options.config))
     new_figure(1.0, 1.0)  # fails now, not after an hour, if matplotlib is missing
     subject = _subject(options, settings)
@@ -129,7 +129,7 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
             "part": options.part if options.list is not None and options.list.suffix == ".json" else None,
             "colors": [f"{name} {list(map(list, each))}" for name, each in colors.items()],
         },
-        "rules": {"radius_of": options.radius_of, "min_radius": options.min_radius, "as_robot": options.as_robot},
+        "rules": {"radius_of": options.radius_of, "as_robot": options.as_robot},
         "settings": asdict(settings),
     }
 

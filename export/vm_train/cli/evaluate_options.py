@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
 from vm_embedded.cli.options import add_settings
@@ -167,13 +166,6 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         "all pictures; scene: the radius of each picture's ball (sceneX.json of vm-synth); default all",
     )
     group.add_argument(
-        "--min-radius",
-        type=_length,
-        default=2.0,
-        metavar="PX",
-        help="ignore true objects of a smaller radius [px]; default 2",
-    )
-    group.add_argument(
         "--strict",
         action="store_true",
         help="stop at a picture that can't be used; default: skip it. An unknown color in a mask always stops",
@@ -192,13 +184,3 @@ def _color(text: str) -> tuple[str, tuple[int, int, int]]:
         raise argparse.ArgumentTypeError(f"{text!r}: write CLASS=R,G,B with values up to 255, for example ball=255,0,0")
     red, green, blue = map(int, parts)
     return name, (red, green, blue)
-
-
-def _length(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of at least 0")
-    return value
