@@ -1,8 +1,4 @@
-"""The text of docs/api.md, the reference of vm_embedded's public names, from their signatures and docstrings.
-
-`python docs/help_pages.py` writes it; a test checks that it is current. It is plain Markdown, so that it also reads
-well on a code host.
-"""
+"""The API reference of the web site: vm_embedded's public names, from their signatures and docstrings."""
 
 from __future__ import annotations
 
@@ -57,7 +53,7 @@ _NAMES = {name for names in GROUPS.values() for name in names}
 
 HEAD = """# API reference
 
-Every public name of `vm_embedded`, made from its docstring by `make docs`. Examples are on the page
+Every public name of `vm_embedded`, made from its docstring by `make site`. Examples are on the page
 [Use](use.md#from-python). Arrays are numpy arrays: shapes are in parentheses, units in brackets.
 """
 

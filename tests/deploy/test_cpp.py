@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.soak.failing_camera import Fault
 from tests.vm_embedded.live.running import PATIENCE, running
 from tests.vm_embedded.output.features import demo_frame, full, scene
 from vm_embedded import Tracker
@@ -220,12 +221,12 @@ def behaving(compiled, path):
 
 @pytest.mark.long
 def test_a_behavior_walks_to_the_ball_and_stands_while_the_camera_is_lost(compiled, tmp_path):
-    source, path = tmp_path / "script.toml", tmp_path / "lines"
-    source.write_text('faults = [{ kind = "unplug", at = 4.0, seconds = 4.0 }]\n')
-    camera = ("--camera", f"fault:{source}", "--camera-lost-ms", 500, "--camera-retry-ms", 50, "--track")
+    path = tmp_path / "lines"
+    camera = ("--camera-lost-ms", 500, "--camera-retry-ms", 50, "--track")
+    unplugged = Fault("unplug", at=4.0, seconds=4.0)
     with behaving(compiled, path) as robot:
         robot.wait_for("stand: unreachable: can't connect")
-        with running(tmp_path, *camera, "--output-unix", path, *BINARY):
+        with running(tmp_path, *camera, "--output-unix", path, *BINARY, faults=[unplugged]):
             assert re.match(r"walk: the ball is -?\d\.\d m ahead", robot.wait_for("walk: "))
             robot.wait_for("stand: camera_lost")
             robot.wait_for("walk: ")
