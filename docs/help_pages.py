@@ -2,7 +2,8 @@
 
 - docs/command-line.md from the parsers and from the usage texts of the robot's scripts,
 - docs/vm.toml, scene.toml, train.toml and look.toml from the entries of configurations,
-- docs/messages.schema.json, the JSON Schema of the messages,
+- docs/messages.schema.json, the JSON Schema of the messages, and the parts of use.md, daemon.md and
+  deploy/cpp/vm_detect.hpp that describe them (message_pages.py),
 - docs/api.md from the docstrings (api_page.py).
 
 `python docs/help_pages.py` writes them; a test checks that they are current.
@@ -16,13 +17,13 @@ import re
 from pathlib import Path
 
 import api_page
+import message_pages
 
 from vm_calibrate import cli as calibrate
 from vm_embedded.cli import bench, detect, doctor
 from vm_embedded.cli.program import PrintCompletion
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.live import configuration as detection
-from vm_embedded.output.message_schema import message_schema
 from vm_export import cli as export
 from vm_label import cli as label
 from vm_mesh import cli as mesh
@@ -46,7 +47,8 @@ def pages() -> dict[Path, str]:
     return {
         DOCS / "command-line.md": command_line(),
         DOCS / "api.md": api_page.page(),
-        DOCS / "messages.schema.json": json.dumps(message_schema(), indent=1) + "\n",
+        DOCS / "messages.schema.json": json.dumps(message_pages.schema(), indent=1) + "\n",
+        **message_pages.pages(DOCS.parent),
         DOCS / "vm.toml": to_commented_toml(detection.Configuration(), detection.HEADER),
         DOCS / "scene.toml": to_commented_toml(scene.SceneConfiguration(), scene.HEADER),
         DOCS / "train.toml": to_commented_toml(training.TrainConfiguration(), training.HEADER),
