@@ -1,5 +1,5 @@
-"""What is made from the records of messages (vm_embedded/records.py): the JSON Schema, the tables and the reader of the
-documentation, and the structures of the C++ header. help_pages.py writes them.
+"""What is made from the records of messages (vm_embedded/borders/records.py): the JSON Schema, the tables and the
+reader of the documentation, and the structures of the C++ header. help_pages.py writes them.
 
 A page, and the header, hold each made part between a line `messages: NAME` and a line `end`.
 """
@@ -15,13 +15,13 @@ from typing import Any
 
 import api_page
 
+from vm_embedded.borders.records import Entry, Record, entries
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detections import STAGES
 from vm_embedded.detection.track import Track
 from vm_embedded.field.features import FieldFeatures
 from vm_embedded.output.binary_form import HEADER, LAYOUT, RECORDS, is_list, number_type
 from vm_embedded.output.messages import KINDS, STATES, FileFrame, LiveFrame, StateMessage, Status
-from vm_embedded.records import Entry, Record, entries
 
 Schema = dict[str, Any]
 
@@ -41,7 +41,7 @@ def pages(top: Path) -> dict[Path, str]:
         "state": table(StateMessage),
         "status": table(Status, without=StateMessage),
         "layout": reader_layout(),
-        "states": f"enum class State : std::uint8_t {{ {', '.join((*STATES, 'unreachable'))} }};\n",
+        "states": states(),
         "structures": structures(),
         "readers": readers(),
     }
@@ -166,6 +166,18 @@ def reader_layout() -> str:
         pieces = textwrap.wrap(" ".join(re.sub(r":(\d,\d)", r":(\1)", each) for each in fields), 100)
         lines.append(f'    "{name}": ' + ' "\n    "'.join(pieces).join('""') + ",")
     return "\n".join([*lines, "}"]) + "\n"
+
+
+def states() -> str:
+    """The states in C++, with their names."""
+    lines = textwrap.wrap(", ".join(f'"{each}"' for each in (*STATES, "unreachable")), 100)
+    names = "\n".join(f"        {each}" for each in lines)
+    return (
+        f"enum class State : std::uint8_t {{ {', '.join((*STATES, 'unreachable'))} }};\n\n"
+        "inline const char* name(State state) {\n"
+        f"    static constexpr std::array<const char*, {len(STATES) + 1}> names{{\n{names}}};\n"
+        "    return names[static_cast<std::size_t>(state)];\n}\n"
+    )
 
 
 def structures() -> str:

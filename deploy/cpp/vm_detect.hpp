@@ -44,13 +44,13 @@ namespace vm_detect {
 // The state of vm-detect, as docs/daemon.md lists them. unreachable: there is no connection, or it is silent.
 // messages: states
 enum class State : std::uint8_t { starting, ok, degraded, camera_lost, pose_stale, stopping, unreachable };
-// end
 
 inline const char* name(State state) {
-    static constexpr std::array<const char*, 7> names{"starting",   "ok",       "degraded",   "camera_lost",
-                                                      "pose_stale", "stopping", "unreachable"};
+    static constexpr std::array<const char*, 7> names{
+        "starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping", "unreachable"};
     return names[static_cast<std::size_t>(state)];
 }
+// end
 
 using Pair = std::array<float, 2>;
 using Triple = std::array<float, 3>;

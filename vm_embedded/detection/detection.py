@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from ..arrays import Floats
-from ..records import SHARE, SIZE, Record, Sent
+from ..borders.records import SHARE, SIZE, Record, Sent
 from .track import Track
 
 

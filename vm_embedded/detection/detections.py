@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 
 from ..arrays import AnyImage, Floats, Image, Singles, one_number
+from ..borders.records import SIZE, Record, Sent
 from ..errors import InputError, one_line, unknown
 from ..field.features import FieldFeatures
 from ..files import write_file
 from ..network.manifest import Manifest
-from ..records import SIZE, Record, Sent
 from .detection import Detection
 from .observation import Observation
 from .overlay import draw_overlay

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 
 from ..arrays import Floats
-from ..records import SIZE, Record, Sent
+from ..borders.records import SIZE, Record, Sent
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from ..arrays import Floats, Singles
-from ..records import SHARE, SIZE, Record, Sent
+from ..borders.records import SHARE, SIZE, Record, Sent
 
 _PLACE = Sent(3, (2,))
 

@@ -1,7 +1,7 @@
 """The binary form of messages: a header, then lists of records, then a text; all numbers little-endian.
 
-It follows from the records of messages (records.py): the same fields in the same order, each number with the digits of
-the JSON form. docs/daemon.md shows the layout, with a reader.
+It follows from the records of messages (borders/records.py): the same fields in the same order, each number with the
+digits of the JSON form. docs/daemon.md shows the layout, with a reader.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from zlib import crc32
 
 import numpy as np
 
-from ..records import Entry, Record, entries
+from ..borders.records import Entry, Record, entries
 from .messages import LiveFrame, Message
 
 Field = tuple[str, str, tuple[int, ...]]

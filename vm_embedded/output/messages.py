@@ -11,11 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+from ..borders.records import SIZE, Record, Sent
 from ..cameras.camera import Shot
 from ..cameras.frame_source import Frame
 from ..detection.detection import Detection
 from ..detection.detections import ClassPoints, Detections, Results, results
-from ..records import SIZE, Record, Sent
 
 STATES = ("starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping")
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -72,9 +71,17 @@ class Record:
         }
 
 
-@cache
 def entries(record: type[Record]) -> tuple[Entry, ...]:
     """The fields of a class of records that are in messages."""
+    if record not in _TABLES:
+        _TABLES[record] = _table(record)
+    return _TABLES[record]
+
+
+_TABLES: dict[type[Record], tuple[Entry, ...]] = {}
+
+
+def _table(record: type[Record]) -> tuple[Entry, ...]:
     hints = get_type_hints(record, include_extras=True)
     for name, member in vars(record).items():
         if isinstance(member, property):
