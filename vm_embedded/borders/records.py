@@ -63,12 +63,12 @@ class Record:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values for JSON by their names in messages, with rounded numbers."""
-        values = {each: getattr(self, each.attribute) for each in entries(type(self))}
-        return {
-            each.name: value if each.type is None else _plain(value, each.sent)
-            for each, value in values.items()
-            if value is not None or each.sent.null
-        }
+        found = {}
+        for each in entries(type(self)):
+            value = getattr(self, each.attribute)
+            if value is not None or each.sent.null:
+                found[each.name] = value if each.type is None else _plain(value, each.sent)
+        return found
 
 
 def entries(record: type[Record]) -> tuple[Entry, ...]:
@@ -95,14 +95,12 @@ def _table(record: type[Record]) -> tuple[Entry, ...]:
 
 
 def _entry(attribute: str, hint: Any, sent: Sent) -> Entry:
-    some = [each for each in get_args(hint) if each is not type(None)]
     may_lack = type(None) in get_args(hint)
     if may_lack:
-        (hint,) = some
-    kind = _innermost(hint)
+        (hint,) = (each for each in get_args(hint) if each is not type(None))
     is_list = get_origin(hint) is tuple and not sent.shape
     many = dict if get_origin(hint) is Mapping else tuple if is_list else None
-    return Entry(sent.name or attribute, attribute, sent, kind, many, may_lack)
+    return Entry(sent.name or attribute, attribute, sent, _innermost(hint), many, may_lack)
 
 
 def _innermost(hint: Any) -> Any:

@@ -64,7 +64,7 @@ _LISTS = {
 _HEADER: list[Field] = [
     *((name, "<u4", ()) for name in ("length", "layout", "is_frame")),
     *(
-        (next(_fields((each,))) if name not in _LISTS and not each.is_record else (name, "<u4", ()))
+        (name, "<u4", ()) if name in _LISTS or each.is_record else next(_fields((each,)))
         for name, each in ENTRIES.items()
     ),
     ("text", "<u4", ()),
@@ -86,10 +86,7 @@ def to_binary(message: Message) -> bytes:
 
     The text has the names of the frame's classes, one per line, or the reason of a state.
     """
-    values = dict(message)
-    for name, each in ENTRIES.items():
-        if each.is_record and name not in RECORDS:
-            values |= message.get(name) or {}
+    values = message | message.get("field", {})
     codes: dict[str, int] = {}
     lists = {
         name: np.array(list(_rows(ENTRIES[name], values.get(name), codes)), kind) for name, kind in RECORDS.items()
