@@ -159,9 +159,16 @@ def _field_table(value: type, meanings: dict[str, str]) -> str:
         meaning += "; {:g} to {:g}".format(*data["limits"]) if data.get("limits") else ""
         default = "" if each.default is dataclasses.MISSING else f"`{each.default!r}`"
         default = default if each.default_factory is dataclasses.MISSING else f"`{each.default_factory()!r}`"
-        cells = (f"`{each.name}`", f"`{each.type}`", default, *([meaning] if explained else []))
+        cells = (f"`{each.name}`", f"`{_type(each.type)}`", default, *([meaning] if explained else []))
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows)
+
+
+def _type(annotation: str) -> str:
+    """A type as the source has it, without the rest of an Annotated."""
+    node = ast.parse(annotation, mode="eval").body
+    is_annotated = isinstance(node, ast.Subscript) and ast.unparse(node.value) == "Annotated"
+    return ast.unparse(node.slice.elts[0]) if is_annotated else annotation
 
 
 def _fields(value: type) -> list[dataclasses.Field[Any]]:
@@ -191,7 +198,7 @@ def _member(owner: str, value: type, name: str) -> str:
         getattr(each, "fget", None) or getattr(each, "func", None) or getattr(each, "__func__", each) for each in found
     ]
     text = _markdown(next((each.__doc__ for each in functions if each.__doc__), None), _parameters(functions[0]))
-    kind = str(inspect.signature(functions[0]).return_annotation)
+    kind = _type(str(inspect.signature(functions[0]).return_annotation))
     if isinstance(found[0], (property, cached_property)):
         return f"**`{name}: {kind}`**\n\n{text}"
     if name in _SPECIAL:

@@ -2,7 +2,9 @@
 
 site_pages are pages of the web site only (site/outside_pages.py adds them): the command line, from the parsers and from
 the usage texts of the robot's scripts, and the API reference, from the docstrings (api_page.py). pages are files of the
-repository: `python docs/help_pages.py` writes them, and a test checks that they are current.
+repository that describe messages (message_pages.py): messages.schema.json, and the parts of use.md, daemon.md and
+deploy/cpp/vm_detect.hpp between markers. `python docs/help_pages.py` writes them, and a test checks that they are
+current.
 """
 
 from __future__ import annotations
@@ -13,11 +15,11 @@ import re
 from pathlib import Path
 
 import api_page
+import message_pages
 
 from vm_calibrate import cli as calibrate
 from vm_embedded.cli import bench, detect, doctor
 from vm_embedded.cli.program import PrintAllHelp, PrintCompletion
-from vm_embedded.output.message_schema import message_schema
 from vm_export import cli as export
 from vm_label import cli as label
 from vm_mesh import cli as mesh
@@ -35,7 +37,10 @@ SCRIPTS = DOCS.parent / "deploy" / "robot"
 
 def pages() -> dict[Path, str]:
     """All files that this script writes, with their texts."""
-    return {DOCS / "messages.schema.json": json.dumps(message_schema(), indent=1) + "\n"}
+    return {
+        DOCS / "messages.schema.json": json.dumps(message_pages.schema(), indent=1) + "\n",
+        **message_pages.pages(DOCS.parent),
+    }
 
 
 def site_pages() -> dict[str, str]:

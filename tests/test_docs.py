@@ -39,7 +39,7 @@ def docs_script(monkeypatch):
     """Imports a script of docs/ by its name."""
     monkeypatch.syspath_prepend(str(DOCS))
     yield __import__
-    for name in ("help_pages", "api_page"):
+    for name in ("help_pages", "api_page", "message_pages"):
         sys.modules.pop(name, None)
 
 

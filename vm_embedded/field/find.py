@@ -87,7 +87,7 @@ def _uprights(bases: Sequence[Base], name: str, height: float, pixels: Floats) -
 def _upright(base: Base, name: str, height: float, pixel: Floats) -> Upright:
     toward = np.array([*base.position, -height])
     distance = float(np.linalg.norm(toward))
-    return Upright(name, base.position, distance, toward / distance, pixel, base.width, base.confidence)
+    return Upright(name, base.confidence, base.position, distance, toward / distance, pixel, base.width)
 
 
 def _straight_and_round(points: LinePoints, likely: LinePoints) -> tuple[list[Piece], CirclePoints | None]:
