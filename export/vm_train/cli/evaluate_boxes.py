@@ -133,8 +133,8 @@ def _about(options: argparse.Namespace, models: dict[str, ModelFile], whole: boo
         "networks": [{"file": name, "sha256": each.sha256} for name, each in models.items()],
         "measured": "whole detector" if whole else "close look",
         "boxes": str(options.boxes),
-        "list": None if options.list is None else str(options.list),
-        "part": None if options.list is None else options.part or "test",
+        "list": options.list and str(options.list),
+        "part": options.list and (options.part or "test"),
     }
 
 

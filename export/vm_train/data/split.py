@@ -11,7 +11,7 @@ from itertools import combinations
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import read_regular, write_file
+from vm_embedded.files import read_bytes, read_regular, write_file
 
 from .picture_lists import read_list
 
@@ -69,8 +69,7 @@ def split_by_lists(numbers: Sequence[str], training: Path | None, validation: Pa
     """Split pictures by lists, as `read_list` reads them.
 
     Without a list of its own, training gets all pictures that no list names; validation and test get none. Raises
-    InputError naming file and line for a picture that does not exist, and InputError for a picture in two parts and if
-    training or validation gets no picture.
+    InputError for a picture that does not exist or is in two parts, and if training or validation gets no picture.
     """
     chosen = {
         name: () if path is None else read_list(path, numbers)
@@ -97,9 +96,7 @@ def write_split(path: Path, split: Split) -> None:
 def read_split(path: Path) -> Split:
     """Read pictures.json. Raises InputError naming the file and its fault."""
     try:
-        table = json.loads(read_regular(path))
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+        table = json.loads(read_bytes(path))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: {one_line(error)}") from error
     names = ("training", *_HELD_OUT)
