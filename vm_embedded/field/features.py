@@ -6,8 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..arrays import Floats, Singles
 
 
@@ -55,7 +53,7 @@ class Segment:
     @property
     def length(self) -> float:
         """Distance between the ends [m]."""
-        return float(np.hypot(*(self.ends[1] - self.ends[0])))
+        return math.dist(*self.ends.tolist())
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
