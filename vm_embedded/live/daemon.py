@@ -200,7 +200,7 @@ class Daemon:
         self._notifier.send(READY=1)
         self._log("ready", model=self._configuration.model, proved=self._proved, camera=without_password(camera.source))
         if status.page:
-            self._log("status page", address=status.page, token=self.page.token)
+            self._log("status page", url=f"http://{status.page}/", token=self.page.token)
             if self.page.not_kept:
                 self._log("the next start will have another token", "warning", reason=self.page.not_kept)
         self._clock_offset = _clock_offset()
