@@ -115,7 +115,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS), help="seeds of drawing and training")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the trainings")
     parser.add_argument("--json", type=Path, default=Path("benchmarks/fine_tuning.json"), help="results")
-    parser.add_argument("--plot", type=Path, default=Path("benchmarks/experiments/fine-tuning.svg"), help="plot of the results")
+    parser.add_argument("--plot", type=Path, default=Path("benchmarks/experiments/fine-tuning.svg"), help="their plot")
     options = parser.parse_args()
     names = parse_names(options.names)
     training, test = (read_boxes(folder, names=names).pictures for folder in (options.training, options.test))
