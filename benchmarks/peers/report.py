@@ -1,4 +1,6 @@
-"""From the results of the peers to the tables and plots of experiments/other-detectors.md: `python -m benchmarks.peers.report`.
+"""From the results of the peers to the tables and plots of experiments/other-detectors.md.
+
+Run it with `python -m benchmarks.peers.report`.
 
 It reads peer_times.json, peer_training.json and peer_scores.json of this folder's parent.
 """
