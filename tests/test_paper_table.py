@@ -22,7 +22,7 @@ LABELS = EQUATIONS | FIGURES | {"tab:visualmesh_performance"}
 
 CODE = re.compile(r"\[`([\w./]+)`\]\(\.\./([\w./]+)\): ((?:`[\w.]+`(?:, )?)+)")
 LINK = r"\[[^\]]+\]\([\w./]+(?:#[\w-]+)?\)"
-ELSEWHERE = re.compile(rf"not here: [^`]+\.|(?:measured|see): {LINK}|see the next (?:two|three) lines")
+ELSEWHERE = re.compile(rf"not here: [^`]+\.|{LINK}|see the next (?:two|three) lines")
 """What a line names instead of code. test_docs.py follows the links."""
 
 
