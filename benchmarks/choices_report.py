@@ -1,4 +1,4 @@
-"""Tables and plot of experiments/mesh-network.md from benchmarks/choices.json: `python -m benchmarks.choices_report`."""
+"""Tables and plot of experiments/mesh-network.md from choices.json: `python -m benchmarks.choices_report`."""
 
 from __future__ import annotations
 
