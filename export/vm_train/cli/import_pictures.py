@@ -61,13 +61,17 @@ def _renamed(text: str) -> tuple[str, str]:
 
 def run_import(options: argparse.Namespace) -> int:
     """Import as the options say and return the exit status. Raises InputError, also if no picture was imported."""
-    from ..formats.importing import RecordRules, import_pictures
+    from ..formats.importing import import_pictures
 
-    rules = RecordRules(dict(options.key), options.normalized)
     bar = ProgressBar(100)
     try:
         result = import_pictures(
-            options.files, options.out, rules, options.strict, lambda share: bar.show(int(100 * share))
+            options.files,
+            options.out,
+            dict(options.key),
+            options.normalized,
+            options.strict,
+            lambda share: bar.show(int(100 * share)),
         )
     finally:
         bar.clear()

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from pathlib import Path
+from typing import Any
 
-from vm_embedded.errors import InputError, VisualMeshError, unknown
+from vm_embedded.errors import InputError, VisualMeshError
 
-from .picture_example import KEYS, WrongUnitError, picture_of
+from ..data.picture_files import FileName
+from .picture_example import WrongUnitError, picture_of
 from .picture_folder import PictureFolder
-from .shards import import_shard, is_shard
+from .shards import check_readable, import_shard, is_shard
 from .tfexample import parse_example
 from .tfrecord import read_records
 
@@ -35,40 +38,31 @@ class Imported:
     remarks: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class RecordRules:
-    """How to read records.
-
-    renaming: the files' names of features, by our names in KEYS. normalized: the files give focal length, center and k
-    for an image of width 1, not in pixels. Raises InputError for an unknown key.
-    """
-
-    renaming: Mapping[str, str]
-    normalized: bool = False
-
-    def __post_init__(self) -> None:
-        for key in self.renaming:
-            if key not in KEYS:
-                raise InputError(unknown("key", key, KEYS))
-
-
 def import_pictures(
-    files: Sequence[str], out: Path, rules: RecordRules, strict: bool, report: Callable[[float], None]
+    files: Sequence[str],
+    out: Path,
+    renaming: Mapping[str, str],
+    normalized: bool,
+    strict: bool,
+    report: Callable[[float], None],
 ) -> Imported:
     """Write the pictures of archives and TFRecord files to a folder, except those that are there already.
 
-    files: as `is_shard` tells them apart. report: is called with the share of the work that is done, 0 to 1. A record
-    that lacks a feature or can't be decoded is skipped, and a picture that lacks a file is named; with `strict` they
-    raise InputError. Always raises InputError for an unreadable or damaged file, lenses in the other unit, and two
-    different pictures of one number.
+    files: as `is_shard` tells them apart. renaming, normalized: for records, as `picture_of` takes them. report: is
+    called with the share of the work that is done, 0 to 1. A record that lacks a feature or can't be decoded is
+    skipped, and a picture that lacks a file is named; with `strict` they raise InputError. Always raises InputError for
+    an unreadable or damaged file, lenses in the other unit, and two different pictures of one number.
     """
+    for name in files:
+        check_readable(name)
+    convert = partial(picture_of, renaming=renaming, normalized=normalized)
     folder = PictureFolder(out)
     there, skipped, numbers = folder.count, list[str](), count()
     for position, name in enumerate(files):
         if is_shard(name):
             shares = import_shard(name, folder)
         else:
-            shares = _import_records(Path(name), folder, numbers, rules, None if strict else skipped)
+            shares = _import_records(Path(name), folder, numbers, convert, None if strict else skipped)
         for share in shares:
             report((position + share) / len(files))
     incomplete = folder.lacking(folder.imported)
@@ -78,19 +72,23 @@ def import_pictures(
 
 
 def _import_records(
-    path: Path, folder: PictureFolder, numbers: Iterator[int], rules: RecordRules, skipped: list[str] | None
+    path: Path,
+    folder: PictureFolder,
+    numbers: Iterator[int],
+    convert: Callable[[Any, int], dict[FileName, bytes]],
+    skipped: list[str] | None,
 ) -> Iterator[float]:
     """Write the pictures of a TFRecord file. skipped: gets the faults of records; None: raise them."""
     for record in read_records(path):
         number = next(numbers)
         try:
-            found = picture_of(parse_example(record.payload), rules.renaming, rules.normalized)
+            found = convert(parse_example(record.payload), number)
         except VisualMeshError as error:
             fault = f"{record.where}: {error}"
             if skipped is None or isinstance(error, WrongUnitError):
                 raise InputError(fault) from error
             skipped.append(fault)
         else:
-            for name, content in found.files(number):
+            for name, content in found.items():
                 folder.write(name, content)
         yield record.share

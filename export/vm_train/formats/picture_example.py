@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -40,27 +40,8 @@ class WrongUnitError(InputError):
     """The lens is in image widths instead of pixels, or the other way round. The other records will have it too."""
 
 
-@dataclass(frozen=True)
-class ExamplePicture:
-    """The files of one picture: bytes of image and mask as the Example holds them, and the text of the lens file.
-
-    suffix: of the image file.
-    """
-
-    image: bytes
-    suffix: str
-    mask: bytes
-    lens: str
-
-    def files(self, number: int) -> Iterator[tuple[FileName, bytes]]:
-        """The files' names and contents. The image is last: an import writes it when the others are complete."""
-        yield FileName("mask", f"{number:07d}", ".png"), self.mask
-        yield FileName("lens", f"{number:07d}", ".yaml"), self.lens.encode()
-        yield FileName("image", f"{number:07d}", self.suffix), self.image
-
-
-def picture_of(example: Any, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:
-    """The picture in an Example.
+def picture_of(example: Any, number: int, renaming: Mapping[str, str], normalized: bool) -> dict[FileName, bytes]:
+    """The files of the picture in an Example: image and mask as it holds them, and the lens file. The image is last.
 
     renaming: the Example's names of features, by our names in KEYS. normalized: the Example gives focal length, center
     and k for an image of width 1, not in pixels. Raises WrongUnitError if the focal length is in the other unit, and
@@ -73,7 +54,11 @@ def picture_of(example: Any, renaming: Mapping[str, str], normalized: bool) -> E
         raise InputError("mask is not a PNG file")
     if mask_size != size:
         raise InputError(f"mask has {_pixels(mask_size)}, but the image has {_pixels(size)}")
-    return ExamplePicture(image, suffix, mask, features.lens(size[0], normalized))
+    return {
+        FileName("mask", f"{number:07d}", ".png"): mask,
+        FileName("lens", f"{number:07d}", ".yaml"): features.lens(size[0], normalized).encode(),
+        FileName("image", f"{number:07d}", suffix): image,
+    }
 
 
 def _pixels(size: tuple[int, int]) -> str:

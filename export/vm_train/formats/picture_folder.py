@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from vm_embedded.errors import InputError
-from vm_embedded.files import read_regular, write_file
+from vm_embedded.files import read_bytes, read_regular, write_file
 
 from ..data.decoded_cache import KEPT_FREE
 from ..data.picture_files import LARGEST_FILE, PARTS, FileName, parse_name
@@ -63,7 +63,7 @@ class PictureFolder:
         self.imported.add(name.number)
         before = self._files[name.number].get(name.part)
         if before is not None:
-            if before != path.name or self._read(path) != content:
+            if before != path.name or read_bytes(path, largest=LARGEST_FILE) != content:
                 raise InputError(
                     f"{self._folder} has another {before} already: two pictures have the number {name.number}; import "
                     "one of them into another folder"
@@ -86,10 +86,3 @@ class PictureFolder:
         if stamp is not None:
             self._whole[archive] = stamp
             write_file(self._record, json.dumps(self._whole, indent=1) + "\n")
-
-    @staticmethod
-    def _read(path: Path) -> bytes:
-        try:
-            return read_regular(path, LARGEST_FILE)
-        except OSError as error:
-            raise InputError(f"can't read {path}: {error.strerror or error}") from error

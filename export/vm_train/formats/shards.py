@@ -46,6 +46,15 @@ def is_shard(name: str) -> bool:
     return name == "-" or name.startswith(_ADDRESSES) or name.lower().endswith((".tar", ".tar.gz", ".tgz"))
 
 
+def check_readable(name: str) -> None:
+    """Check an input before long work. Raises InputError if it is a file that can't be opened."""
+    if name != "-" and not name.startswith(_ADDRESSES):
+        try:
+            open_regular(Path(name)).close()
+        except OSError as error:
+            raise InputError(f"can't read {name}: {error.strerror or error}") from error
+
+
 def import_shard(name: str, folder: PictureFolder) -> Iterator[float]:
     """Write the pictures of an archive to a folder. Gives the share that was read, 0 to 1, after each member.
 

@@ -26,11 +26,11 @@ _READ = f"""
 import resource, sys
 from pathlib import Path
 from vm_embedded.errors import InputError
-from vm_train.formats.importing import RecordRules, import_pictures
+from vm_train.formats.importing import import_pictures
 used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (used + {_ALLOWED},) * 2)
 try:
-    import_pictures([sys.argv[1]], Path(sys.argv[1] + "-out"), RecordRules({{}}), True, lambda share: None)
+    import_pictures([sys.argv[1]], Path(sys.argv[1] + "-out"), {{}}, False, True, lambda share: None)
 except InputError as error:
     print(error)
 """

@@ -10,7 +10,7 @@ from vm_embedded import Orientation, read_lens_file
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_train.data.pictures import find_pictures
-from vm_train.formats.importing import RecordRules, import_pictures
+from vm_train.formats.importing import import_pictures
 
 from .tfrecord_writer import example_bytes, write_records
 
@@ -55,7 +55,7 @@ def written(path, *examples, compressed=False):
 
 
 def imported(files, out, renaming=None, normalized=False, strict=False, report=lambda share: None):
-    return import_pictures(list(map(str, files)), out, RecordRules(renaming or {}, normalized), strict, report)
+    return import_pictures(list(map(str, files)), out, renaming or {}, normalized, strict, report)
 
 
 @given(
@@ -103,11 +103,6 @@ def test_features_of_other_names_are_found_by_renaming(tmp_path):
 def test_a_k_that_was_renamed_must_be_there(tmp_path):
     made = imported([written(tmp_path / "a", reference_example())], tmp_path / "out", {"lens/k": "lens/distortion"})
     assert "lacks lens/k (as 'lens/distortion')" in made.skipped[0]
-
-
-def test_renaming_what_nobody_needs_is_refused(tmp_path):
-    with pytest.raises(InputError, match="unknown key 'lens/foo'"):
-        imported([written(tmp_path / "a", reference_example())], tmp_path / "out", {"lens/foo": "x"})
 
 
 def test_normalized_lenses_become_those_of_the_image_in_pixels(tmp_path):

@@ -19,7 +19,7 @@ from tests.vm_train.data.test_pictures import write_pictures
 from vm_embedded.errors import InputError
 from vm_train.data.pictures import find_pictures
 from vm_train.formats import picture_folder, shards
-from vm_train.formats.importing import RecordRules, import_pictures
+from vm_train.formats.importing import import_pictures
 
 RECORD = "import.json"
 
@@ -60,7 +60,7 @@ def archives(files, tmp_path):
 
 
 def imported(names, out, strict=True, report=lambda share: None):
-    return import_pictures([str(each) for each in names], out, RecordRules({}), strict, report)
+    return import_pictures([str(each) for each in names], out, {}, False, strict, report)
 
 
 def pictures_in(folder):
@@ -201,8 +201,10 @@ def test_a_disk_without_room_is_named_before_it_is_full(archives, files, tmp_pat
 def test_folders_that_can_not_be_used_are_named(archives, tmp_path):
     with pytest.raises(InputError, match=r"can't use folder .*a\.tar: "):
         imported(archives, tmp_path / "a.tar")
-    with pytest.raises(InputError, match=r"nowhere\.tar: can't be read after its start"):
-        imported([tmp_path / "nowhere.tar"], tmp_path / "out")
+    with pytest.raises(InputError, match=r"can't read .*nowhere\.tar: No such file"):
+        imported([*archives, tmp_path / "nowhere.tar"], tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+    imported(archives, tmp_path / "out")
     for text in ("{", "[]"):
         (tmp_path / "out" / RECORD).write_text(text)
         with pytest.raises(InputError, match=r"import\.json is damaged: remove it"):
