@@ -29,10 +29,10 @@ from vm_mesh import cli as mesh
 from vm_ros import cli as ros
 from vm_synth import cli as synth
 from vm_synth.scene import configuration as scene
-from vm_train.cli import evaluate
-from vm_train.cli import options as train
-from vm_train.learning import configuration as training
-from vm_train.look import configuration as look
+from vm_train.cli import evaluate, train
+from vm_train.learning.configuration import TrainConfiguration
+from vm_train.look.configuration import LookConfiguration
+from vm_train.runs.run import header
 
 _ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintCompletion)
 """Options that all programs have."""
@@ -49,8 +49,8 @@ def pages() -> dict[Path, str]:
         DOCS / "messages.schema.json": json.dumps(message_schema(), indent=1) + "\n",
         DOCS / "vm.toml": to_commented_toml(detection.Configuration(), detection.HEADER),
         DOCS / "scene.toml": to_commented_toml(scene.SceneConfiguration(), scene.HEADER),
-        DOCS / "train.toml": to_commented_toml(training.TrainConfiguration(), training.HEADER),
-        DOCS / "look.toml": to_commented_toml(look.LookConfiguration(), look.LOOK_HEADER),
+        DOCS / "train.toml": to_commented_toml(TrainConfiguration(), header("mesh")),
+        DOCS / "look.toml": to_commented_toml(LookConfiguration(), header("look")),
     }
 
 

@@ -93,13 +93,6 @@ class NetworkSettings:
         check_entries(self)
 
 
-HEADER = """Configuration of vm-train. `vm-train config` prints this file.
-Keep only the entries that you change: missing entries have their defaults.
-Each comment gives the meaning of the next entry, its unit in brackets, and its limits.
-An entry [low, high] is a range: each picture gets a random value between the two."""
-"""First comment of a train.toml that is printed."""
-
-
 @dataclass(frozen=True)
 class TrainConfiguration:
     """All sections."""

@@ -19,7 +19,7 @@ class Recipe:
     """Section [training]. Raises InputError."""
 
     epochs: int = number(20, "epochs of each round; the network is validated after each epoch", "", (1, 1e6))
-    looks: int = number(1, "number of times that an epoch uses each picture", "", (1, 1e6))
+    repeats: int = number(1, "number of times that an epoch uses each picture", "", (1, 1e6))
     batch: int = number(8, "pictures in a step, over all processes", "", (1, 1e5))
     window: float = number(
         1.0,

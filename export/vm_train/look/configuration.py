@@ -175,13 +175,6 @@ class PatchAugmentation:
         check_entries(self)
 
 
-LOOK_HEADER = """Configuration of vm-train look. `vm-train look-config` prints this file.
-Keep only the entries that you change: missing entries have their defaults.
-Each comment gives the meaning of the next entry, its unit in brackets, and its limits.
-An entry [low, high] is a range: each patch gets a random value between the two."""
-"""First comment of a look.toml that is printed."""
-
-
 @dataclass(frozen=True)
 class LookConfiguration:
     """All sections."""
