@@ -75,10 +75,10 @@ def run_look(options: argparse.Namespace) -> int:
         glance = LookStart.load(model_path(options.glance), configuration.patches.object_class).look
     model = model_path(options.model)
     configuration = _with_classes_of(model, configuration)
-    numbers = [each.number for each in find_pictures(options.data)]
-    split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
 
     def begin(hardware: Hardware) -> None:
+        numbers = [each.number for each in find_pictures(options.data)]
+        split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
         begin_look_run(
             options.output,
             options.data,
@@ -132,8 +132,7 @@ def _load(folder: Path, moved_to: Path | None, hardware: Hardware) -> LookTraini
     from ..look.run import read_look_run
     from ..look.training import LookTraining
 
-    run = read_look_run(folder)
-    return LookTraining(run if moved_to is None else replace(run, data=moved_to.resolve()), hardware)
+    return LookTraining(read_look_run(folder, moved_to), hardware)
 
 
 def _report(training: LookTraining) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -147,9 +146,7 @@ def _load(folder: Path, moved_to: Path | None, hardware: Hardware) -> MeshTraini
     from ..learning.run import read_run
     from ..learning.training import MeshTraining
 
-    run = read_run(folder)
-    if moved_to is not None:
-        run = replace(run, data=moved_to.resolve())
+    run = read_run(folder, moved_to)
     if hardware.is_leader:
         objects = [name for name, kind in run.configuration.classes.kinds.items() if kind == "object"]
         print(

@@ -193,8 +193,11 @@ def begin_run(
     return replace(run, digests=write_run(folder, "mesh", configuration, split, copies, entries))
 
 
-def read_run(folder: Path) -> MeshRun:
-    """Read a training that was begun. Raises InputError, also if its files were changed since."""
+def read_run(folder: Path, moved_to: Path | None = None) -> MeshRun:
+    """Read a training that was begun. moved_to: where its pictures are now.
+
+    Raises InputError, also if its files were changed since, and ModelError.
+    """
     with description(folder) as content:
         unpacked, digests = content["unpacked"], dict(content["made_from"])
         starts = [Start.load(folder / name) for name in _STARTS.values() if name in digests]
@@ -203,7 +206,7 @@ def read_run(folder: Path) -> MeshRun:
             digests,
             read_split(folder / "pictures.json"),
             int(content["threads"]),
-            Path(content["data"]),
+            Path(content["data"]) if moved_to is None else moved_to.resolve(),
             read_sections(TrainConfiguration, folder / "train.toml"),
             None if unpacked is None else folder / unpacked,
             np.array(list(content["points"].values()), dtype=np.int64),

@@ -20,8 +20,8 @@ from ..graphs.schedule import Item
 from ..runs.hardware import sum_over_processes
 from ..runs.learner import Learner
 from ..runs.optimizer import ScheduledOptimizer
+from .configuration import Recipe
 from .loss import peak_losses, point_losses, targets_of
-from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
 
 _DRAWS = 2

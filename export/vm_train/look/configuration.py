@@ -11,7 +11,7 @@ from vm_embedded.errors import InputError
 from vm_workstation.ranges import range_of
 
 from ..learning.class_table import ClassTable
-from ..learning.recipe import OPTIMIZERS
+from ..learning.configuration import OPTIMIZERS
 
 if TYPE_CHECKING:
     from vm_export.look_network import LookShape

@@ -123,15 +123,18 @@ def begin_look_run(
     return read_look_run(folder)
 
 
-def read_look_run(folder: Path) -> LookRun:
-    """Read a training that was begun. Raises InputError, also if its files were changed since."""
+def read_look_run(folder: Path, moved_to: Path | None = None) -> LookRun:
+    """Read a training that was begun. moved_to: where its pictures are now.
+
+    Raises InputError, also if its files were changed since.
+    """
     with description(folder) as content:
         return LookRun(
             folder=folder,
             digests=dict(content["made_from"]),
             split=read_split(folder / "pictures.json"),
             threads=int(content["threads"]),
-            data=Path(content["data"]),
+            data=Path(content["data"]) if moved_to is None else moved_to.resolve(),
             configuration=read_sections(LookConfiguration, folder / "look.toml"),
             mesh=folder / str(content["mesh"]),
             model=str(content["model"]),

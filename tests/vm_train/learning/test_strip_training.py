@@ -14,7 +14,7 @@ from vm_export.canvas_shape import CanvasShape
 from vm_export.torch_files import load_values, save_values
 from vm_train.graphs.labeled_graph import CONTEXT, LabeledGraph, empty_graph
 from vm_train.graphs.schedule import Item, schedule
-from vm_train.learning.recipe import Recipe
+from vm_train.learning.configuration import Recipe
 from vm_train.learning.trainer import Trainer
 
 COUNT = 4

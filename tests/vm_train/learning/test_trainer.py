@@ -14,7 +14,7 @@ from vm_export.network_shape import NetworkShape
 from vm_export.torch_files import load_values, save_values
 from vm_train.graphs.labeled_graph import LabeledGraph, empty_graph, join_graphs
 from vm_train.graphs.schedule import schedule
-from vm_train.learning.recipe import Recipe
+from vm_train.learning.configuration import Recipe
 from vm_train.learning.trainer import Trainer
 from vm_train.runs.hardware import process_group
 from vm_train.runs.loop import read_state
