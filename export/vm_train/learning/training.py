@@ -98,6 +98,7 @@ class MeshTraining(Training):
         precision = float(np.mean(seen or list(known.values()) or [0.0]))
         if self._progress.is_best(precision):
             self._keep(precision)
+            self._progress.take(precision)
         record = {"validation_average_precision": precision, "average_precision": known}
         return Validation(record, f"validation AP {precision:.3f}", f", {self.speed:.0f} pictures/s")
 
@@ -132,18 +133,16 @@ class MeshTraining(Training):
     def _keep(self, precision: float) -> None:
         """Write the round's best network, and the best of all rounds if it is that, too."""
         progress, run = self._progress, self.run
-        is_best_ever = precision > progress.best_ever
-        progress.best_ever = max(progress.best_ever, precision)
         if not self._hardware.is_leader:
             return
         provenance = run.provenance() | {
             "round": str(progress.round),
-            "epoch": str(progress.best_epoch),
+            "epoch": str(progress.validated + 1),
             "validation_average_precision": f"{precision:.4f}",
             "torch": torch.__version__,
         }
         manifest = replace(run.configuration.manifest, provenance=provenance)
         checkpoint = Checkpoint(self.learner.network, manifest, run.configuration.grid)
         checkpoint.save(run.round_path(progress.round))
-        if is_best_ever:
+        if precision > progress.best_ever:
             checkpoint.save(run.result_path)

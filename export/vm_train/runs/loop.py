@@ -47,14 +47,12 @@ class Progress:
     best_ever: float = _NONE
 
     def is_best(self, score: float) -> bool:
-        """Whether the score of an epoch that is being validated is the best of the round, which it then becomes.
+        """Whether a score is the best of the round; NaN, if nothing was measured, counts as better than all before."""
+        return not score <= self.best
 
-        NaN, if nothing was measured, counts as better than all before.
-        """
-        if score <= self.best:
-            return False
-        self.best, self.best_epoch = score, self.validated + 1
-        return True
+    def take(self, score: float) -> None:
+        """The best score is that of the epoch that is being validated; its network is kept."""
+        self.best, self.best_epoch, self.best_ever = score, self.validated + 1, max(self.best_ever, score)
 
 
 @dataclass(frozen=True)

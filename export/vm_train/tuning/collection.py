@@ -38,7 +38,7 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Collector:
+class WindowCollector:
     """Cuts the patches of a frame. contract: of the network that learns from them. radii (s,): of objects [px]."""
 
     look: TorchLook
@@ -49,7 +49,7 @@ class Collector:
     is_round: bool
 
     @classmethod
-    def of(cls, run: TuningRun, stage: str) -> Collector:
+    def of(cls, run: TuningRun, stage: str) -> WindowCollector:
         """The collector of a stage. Raises InputError or ModelError."""
         before = run.network_before(stage)
         look = TorchLook(before.network, before.contract, TorchLook.of(before.glance))
@@ -81,7 +81,7 @@ def collect_windows(run: TuningRun, stage: str, workers: int, report: Callable[[
     InputError, and VisualMeshError if a worker was killed.
     """
     frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
-    make = partial(Collector.of, run, stage)
+    make = partial(WindowCollector.of, run, stage)
     paths = collect_chunks(frames, make, CHUNK, run.folder / "patches", f"{stage}-", workers, report)
     size = run.network_before(stage).contract.size
     return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])

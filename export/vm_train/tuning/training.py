@@ -125,6 +125,7 @@ class Tuning(Training):
         own = mixture.loss_of(self._patches.own_validation)
         if self._progress.is_best(-own):
             self.kept = _copy(mixture.network)
+            self._progress.take(-own)
         yours = "" if np.isnan(own) else f"{own:.3f} for your frames, "
         return Validation(
             {"own": own, "rendered": mixture.loss, "share": mixture.share},

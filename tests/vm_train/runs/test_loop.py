@@ -59,6 +59,7 @@ class LineTraining(Training):
         score = self._scores[self._progress.validated]
         if self._progress.is_best(score):
             self.kept = {"weight": self.learner.network.weight.detach().clone()}
+            self._progress.take(score)
         return Validation({"score": score}, f"score {score}")
 
     def finish(self):
@@ -120,5 +121,7 @@ def test_a_training_that_diverged_is_not_saved(tmp_path):
 
 def test_scores_that_are_not_measured_keep_the_last_network():
     progress = Progress()
-    assert all(progress.is_best(each) for each in (1.0, float("nan"), float("nan")))
+    for score in (1.0, float("nan"), float("nan")):
+        assert progress.is_best(score)
+        progress.take(score)
     assert not Progress(best=2.0).is_best(2.0)
