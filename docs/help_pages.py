@@ -32,7 +32,7 @@ from vm_synth.scene import configuration as scene
 from vm_train.cli import evaluate, train
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.look.configuration import LookConfiguration
-from vm_train.runs.run import header
+from vm_train.runs.configuration import header
 
 _ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintCompletion)
 """Options that all programs have."""

@@ -12,9 +12,9 @@ from vm_embedded.cli.program import Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.network.bundled import SHIPPED, model_path
 
+from ..data.class_table import ClassTable
 from ..data.pictures import find_pictures
 from ..data.split import split_by_seed
-from ..learning.class_table import ClassTable
 from ..look.configuration import LookConfiguration
 from .options import SET_EXAMPLE, add_configuration, add_data, add_hardware, add_output
 from .training import run_training

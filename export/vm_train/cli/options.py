@@ -10,7 +10,7 @@ from vm_embedded.cli.program import Parser
 from vm_embedded.network.bundled import SHIPPED
 from vm_workstation.option_types import add_device, add_set, at_least
 
-from ..runs.run import KINDS, configuration_name
+from ..runs.configuration import KINDS, configuration_name
 
 SET_EXAMPLE = "training.epochs=5"
 

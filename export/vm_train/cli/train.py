@@ -19,7 +19,8 @@ from ..data.picture_files import paths_of
 from ..data.pictures import find_pictures
 from ..learning.configuration import TrainConfiguration
 from ..look.configuration import LookConfiguration
-from ..runs.run import KINDS, header, kind_of
+from ..runs.configuration import KINDS, header
+from ..runs.run import kind_of
 from ..tuning.configuration import TuningConfiguration
 from .check import check_parser, run_check
 from .check_boxes import refuse_other_options, run_check_boxes
@@ -134,7 +135,7 @@ def _rate(options: argparse.Namespace) -> int:
     with set_up_hardware(options.device, options.workers, options.threads) as hardware:
         good = find_good_pictures(options.data, configuration, hardware, strict=False)
         split = Split(tuple(each.number for each in good), (), ())
-        run = MeshRun(options.data, {}, split, 1, options.data, configuration).with_counts()
+        run = MeshRun(options.data, {}, 1, split, options.data, configuration).with_counts()
         torch.manual_seed(configuration.training.seed)
         found = find_rate(run, hardware, new_network(configuration.network_shape), options.steps)
     for position in range(0, len(found.rates), max(len(found.rates) // 12, 1)):

@@ -15,12 +15,11 @@ from vm_export.canvas_shape import CanvasShape
 from vm_export.grid import GRIDS, Grid
 from vm_export.network_shape import ACTIVATIONS, NetworkShape
 
+from ..data.class_table import ClassTable
 from ..graphs.augmentation import Augmentation
-from .class_table import ClassTable
+from ..runs.configuration import OPTIMIZERS, SCHEDULES
 from .selection import RULES
 
-OPTIMIZERS = ("adamw", "adam", "sgd", "muon")
-SCHEDULES = ("one_cycle", "constant")
 LOSSES = ("cross_entropy", "focal")
 PRECISIONS = ("full", "mixed")
 

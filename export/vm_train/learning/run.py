@@ -27,7 +27,7 @@ from vm_embedded.output.result_files import make_folder
 
 from ..data.decoded_cache import DecodedCache
 from ..data.pictures import find_pictures
-from ..data.split import Split, read_split
+from ..data.split import Split, read_split, write_split
 from ..graphs.graph_cache import GraphCache
 from ..graphs.graph_recipe import GraphRecipe
 from ..graphs.loading import PictureGraphs
@@ -51,11 +51,12 @@ _COUNTED = 300
 class MeshRun(Run):
     """A training as its folder describes it; `begin_run` and `read_run` make it.
 
-    data: folder of the pictures. unpacked: folder for decoded pictures and views, None for no cache. counts (C,):
-    number of points of each class in `counted` pictures. start: the network that each round begins with; None: random
-    weights.
+    split: numbers of the pictures of each part. data: folder of the pictures. unpacked: folder for decoded pictures and
+    views, None for no cache. counts (C,): number of points of each class in `counted` pictures. start: the network that
+    each round begins with; None: random weights.
     """
 
+    split: Split
     data: Path
     configuration: TrainConfiguration
     unpacked: Path | None = None
@@ -179,7 +180,7 @@ def begin_run(
     training.
     """
     check_unused(folder, FILES)
-    run = MeshRun(folder, {}, split, threads, data.resolve(), configuration, unpacked, start=start).with_counts()
+    run = MeshRun(folder, {}, threads, split, data.resolve(), configuration, unpacked, start=start).with_counts()
     entries = {
         "data": str(run.data),
         "unpacked": None if unpacked is None else _relative(unpacked, folder),
@@ -187,10 +188,11 @@ def begin_run(
         "points": dict(zip(configuration.classes.colors, run.counts.tolist(), strict=True)),
     }
     make_folder(folder)
+    write_split(folder / "pictures.json", split)
     copies = [] if start is None else [_STARTS.get(start.path.suffix.lower(), "start.pt")]
     if start is not None:
         write_file(folder / copies[0], read_bytes(start.path))
-    return replace(run, digests=write_run(folder, "mesh", configuration, split, copies, entries))
+    return replace(run, digests=write_run(folder, "mesh", configuration, copies, entries))
 
 
 def read_run(folder: Path, moved_to: Path | None = None) -> MeshRun:
@@ -204,8 +206,8 @@ def read_run(folder: Path, moved_to: Path | None = None) -> MeshRun:
         return MeshRun(
             folder,
             digests,
-            read_split(folder / "pictures.json"),
             int(content["threads"]),
+            read_split(folder / "pictures.json"),
             Path(content["data"]) if moved_to is None else moved_to.resolve(),
             read_sections(TrainConfiguration, folder / "train.toml"),
             None if unpacked is None else folder / unpacked,

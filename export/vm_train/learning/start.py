@@ -17,7 +17,7 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.mesh_networks import MeshShape
 from vm_export.network_weights import network_of
 
-from .class_table import ClassTable
+from ..data.class_table import ClassTable
 from .configuration import TrainConfiguration
 
 _MUST_MATCH = (

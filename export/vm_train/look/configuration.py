@@ -10,8 +10,8 @@ from vm_embedded.config.entries import check_entries, entry, number, one_of, sha
 from vm_embedded.errors import InputError
 from vm_workstation.ranges import range_of
 
-from ..learning.class_table import ClassTable
-from ..learning.configuration import OPTIMIZERS
+from ..data.class_table import ClassTable
+from ..runs.configuration import OPTIMIZERS
 
 if TYPE_CHECKING:
     from vm_export.look_network import LookShape

@@ -17,7 +17,7 @@ from vm_embedded.files import read_bytes, write_file
 from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
 
-from ..data.split import Split, read_split
+from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject
 from ..runs.run import Run, check_unused, description, write_run
 from .configuration import LookConfiguration
@@ -32,10 +32,12 @@ _FILES = ("look.toml", "mesh.onnx", "mesh.pt", _GLANCE, _START, "patches", "look
 class LookRun(Run):
     """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
 
-    data: folder of the pictures. mesh: the copy of the mesh network. model: that network as the user named it.
-    object_class: class to judge. strict: whether a picture that can't be used ends the training.
+    split: numbers of the pictures of each part. data: folder of the pictures. mesh: the copy of the mesh network.
+    model: that network as the user named it. object_class: class to judge. strict: whether a picture that can't be used
+    ends the training.
     """
 
+    split: Split
     data: Path
     configuration: LookConfiguration
     mesh: Path
@@ -106,6 +108,7 @@ def begin_look_run(
     if glance is not None:
         check_glance(glance, object_class, upright_radius_of(configuration, object_class))
     make_folder(folder / "patches")
+    write_split(folder / "pictures.json", split)
     mesh = f"mesh{model.suffix.lower()}"
     write_file(folder / mesh, read_bytes(model))
     looks = {path: each for path, each in ((_GLANCE, glance), (_START, start)) if each is not None}
@@ -119,7 +122,7 @@ def begin_look_run(
         "strict": strict,
         "threads": threads,
     }
-    write_run(folder, "look", configuration, split, (mesh, *looks), entries)
+    write_run(folder, "look", configuration, (mesh, *looks), entries)
     return read_look_run(folder)
 
 

@@ -19,7 +19,7 @@ _MOMENTUM = 0.9  # of sgd
 class ScheduledOptimizer:
     """The optimizers of a network's weights, and their schedule of `total` steps.
 
-    kind, schedule: one of OPTIMIZERS and of SCHEDULES of the configuration. rate: the highest learning rate. decay: of
+    kind, schedule: one of OPTIMIZERS and of SCHEDULES in configuration.py. rate: the highest learning rate. decay: of
     the weights.
     """
 

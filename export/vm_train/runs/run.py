@@ -21,10 +21,7 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.files import locked_folder, read_bytes, read_regular, write_file
 from vm_embedded.output.result_files import make_folder
 
-from ..data.split import Split, write_split
-
-KINDS = ("mesh", "look", "tune")
-"""Kinds of trainings; each is also the command that begins one."""
+from .configuration import KINDS, configuration_name
 
 _FORMAT = 6
 
@@ -33,13 +30,12 @@ _FORMAT = 6
 class Run(ABC):
     """A training as its folder describes it.
 
-    digests: SHA-256 of the files that it was made from, by name. split: the pictures of each part. threads: number of
-    computing threads; a resumed training takes the same.
+    digests: SHA-256 of the files that it was made from, by name. threads: number of computing threads; a resumed
+    training takes the same.
     """
 
     folder: Path
     digests: Mapping[str, str]
-    split: Split
     threads: int
 
     @property
@@ -68,18 +64,16 @@ def write_run(
     folder: Path,
     kind: str,
     configuration: Any,
-    split: Split,
     copies: Sequence[str],
     entries: Mapping[str, Any],
 ) -> dict[str, str]:
-    """Write configuration, split and run.json of a training. Returns the digests of the files that it is made from.
+    """Write configuration and run.json of a training. Returns the digests of the files that it is made from.
 
-    copies: names of further such files, which are in the folder already. entries: what else to keep in run.json. Raises
-    InputError if a file can't be written.
+    copies: names of further such files, which are in the folder already, beside pictures.json. entries: what else to
+    keep in run.json. Raises InputError if a file can't be written.
     """
     toml = configuration_name(kind)
     write_file(folder / toml, to_commented_toml(configuration))
-    write_split(folder / "pictures.json", split)
     digests = {name: sha256_of(folder / name) for name in (toml, "pictures.json", *copies)}
     content = {"kind": kind, "format": _FORMAT, "version": __version__, "made_from": digests, **entries}
     write_file(folder / "run.json", json.dumps(content, indent=1) + "\n")
@@ -118,19 +112,6 @@ def kind_of(folder: Path) -> str:
         if content["kind"] not in KINDS:
             raise ValueError(unknown("kind", content["kind"], KINDS))
         return str(content["kind"])
-
-
-def configuration_name(kind: str) -> str:
-    """Name of the file with the configuration of a kind of training."""
-    return "train.toml" if kind == "mesh" else f"{kind}.toml"
-
-
-def header(kind: str) -> str:
-    """First comment of a configuration that is printed."""
-    return f"""Configuration of vm-train {kind}. `vm-train config {kind}` prints this file.
-Keep only the entries that you change: missing entries have their defaults.
-Each comment gives the meaning of the next entry, its unit in brackets, and its limits.
-An entry [low, high] is a range: each {"picture" if kind == "mesh" else "patch"} gets a random value between the two."""
 
 
 def sha256_of(path: Path) -> str:

@@ -25,7 +25,7 @@ from vm_export.look_weights import look_of
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
-from ..data.split import Split
+from ..data.split import Split, write_split
 from ..runs.run import Run, check_unused, description, write_run
 from .boxed_objects import all_objects, boxes_sha256, check_boxes, is_round, split_by_recording
 from .candidates import search_radii
@@ -63,6 +63,7 @@ class TuningRun(Run):
     model: the network as the user named it. before: its model file. pictures: the frames with their boxes.
     """
 
+    split: Split
     boxes: BoxSource
     configuration: TuningConfiguration
     model: str
@@ -169,7 +170,7 @@ def begin_tuning(
     look, pictures = tuned_look(before), found.pictures
     check_boxes(found, look.contract.object_class, str(boxes.folder))
     check_rendered(look.contract, rendered)
-    run = TuningRun(folder, {}, _split(pictures, configuration), threads, boxes, configuration, name, before, pictures)
+    run = TuningRun(folder, {}, threads, _split(pictures, configuration), boxes, configuration, name, before, pictures)
     for_training = BoxedSet(tuple(run.part(run.split.training)), (), ())
     check_boxes(for_training, look.contract.object_class, f"{boxes.folder}, part for training,")
     make_folder(folder / "patches")
@@ -177,6 +178,7 @@ def begin_tuning(
     write_rendered_for(run.rendered_path, rendered)
     names = [each.image.relative_to(boxes.folder).as_posix() for each in pictures]
     parts = (tuple(names[int(each)] for each in part) for part in vars(run.split).values())
+    write_split(run.split_path, Split(*parts))
     entries = {
         "boxes": str(boxes.folder),
         "format_of_boxes": boxes.format,
@@ -186,7 +188,7 @@ def begin_tuning(
         "boxes_sha256": boxes_sha256(pictures),
     }
     copies = ("before.onnx", "rendered.npz")
-    return replace(run, digests=write_run(folder, "tune", configuration, Split(*parts), copies, entries))
+    return replace(run, digests=write_run(folder, "tune", configuration, copies, entries))
 
 
 def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:

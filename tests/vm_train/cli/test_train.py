@@ -9,7 +9,6 @@ import pytest
 
 from tests.vm_train.commands import COMMAND, environment, run
 from vm_train.cli.train import main
-from vm_train.data.split import Split
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.runs.run import write_run
 
@@ -60,7 +59,8 @@ def test_wrong_options_end_in_one_line(arguments, said, data, configuration, tmp
 @pytest.mark.parametrize("arguments", [["data", "-o", "run"], ["rate", "data"], ["resume", "run"]])
 def test_without_torch_it_says_what_to_install(arguments, tmp_path):
     (tmp_path / "run").mkdir()
-    write_run(tmp_path / "run", "mesh", TrainConfiguration(), Split((), ()), (), {})
+    (tmp_path / "run" / "pictures.json").write_text("{}")
+    write_run(tmp_path / "run", "mesh", TrainConfiguration(), (), {})
     program = (
         f"import sys; sys.modules['torch'] = None; from vm_train.cli.train import main; sys.exit(main({arguments}))"
     )

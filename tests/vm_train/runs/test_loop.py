@@ -9,7 +9,6 @@ import torch
 from torch import nn
 
 from vm_embedded.errors import InputError
-from vm_train.data.split import Split
 from vm_train.runs.hardware import Hardware
 from vm_train.runs.learner import DivergedError, Learner
 from vm_train.runs.log import read_log
@@ -33,7 +32,7 @@ class LineTraining(Training):
     def __init__(self, folder, scores=(1.0, 2.0, 3.0), patience=0, bad=None):
         super().__init__()
         folder.mkdir(exist_ok=True)
-        self.run = LineRun(folder, {}, Split((), ()), 1)
+        self.run = LineRun(folder, {}, 1)
         self.rounds, self.epochs, self.steps, self.patience = ROUNDS, range(EPOCHS), STEPS, patience
         self._scores, self._bad = scores, bad
 

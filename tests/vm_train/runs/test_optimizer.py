@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch import nn
 
-from vm_train.learning.configuration import OPTIMIZERS
+from vm_train.runs.configuration import OPTIMIZERS
 from vm_train.runs.optimizer import ScheduledOptimizer
 
 RATE = 0.02
