@@ -22,7 +22,6 @@ COMMANDS = """\
 vm-detect bag --save-mcap bag/bag.mcap
 vm-detect bag/bag.mcap --save-mcap link.mcap
 vm-bench --image frames/image0.jpg --json frames/image0.jpg
-vm-bench --config vm.toml --lens lens.toml --tune lens.toml
 vm-export model.onnx --no-look -o model.onnx
 vm-export model.onnx --no-look
 vm-calibrate kalibr kalibr.yaml --camera cam0 -o kalibr.yaml

@@ -67,7 +67,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
     judged = [each.contract.object_class for each in looks]
     pictures = select_pictures(options.data, options.list, options.part)
     classes = classes_with_colors(model.manifest, default_colors(path, options.list), options.color)
-    rules = Rules(options.radius_of, options.min_radius, options.strict)
+    rules = Rules(options.radius_of, options.strict)
     job = Job(path, _CANDIDATES, False, classes, rules)
     if model.look is not None and judged[0] in manifest.peaks:
         looks[0], result = _weighted(looks[0], job, pictures, options.workers)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from vm_embedded.borders.credentials import without_credentials
+from vm_embedded.borders.text import printable
 from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, unknown
@@ -75,12 +76,11 @@ def run_import(options: argparse.Namespace) -> int:
         )
     finally:
         bar.clear()
-    for fault in result.skipped[:_SHOWN]:
-        print(f"vm-train: skipped {fault}", file=sys.stderr)
+    lines = [f"skipped {fault}" for fault in result.skipped[:_SHOWN]]
     if len(result.skipped) > _SHOWN:
-        print(f"vm-train: skipped {len(result.skipped) - _SHOWN} more", file=sys.stderr)
-    for remark in result.remarks:
-        print(f"vm-train: {remark}", file=sys.stderr)
+        lines.append(f"skipped {len(result.skipped) - _SHOWN} more")
+    for line in (*lines, *result.remarks):
+        print(f"vm-train: {printable(line)}", file=sys.stderr)
     if not result.count and not result.there:
         raise InputError(f"found no usable picture in {', '.join(map(without_credentials, options.files))}")
     before = f", {result.there} were there already" if result.there else ""

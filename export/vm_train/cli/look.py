@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ from vm_embedded.network.bundled import SHIPPED, model_path
 
 from ..data.class_table import ClassTable
 from ..data.pictures import find_pictures
-from ..data.split import split_by_seed
+from ..data.split import split_beside, split_by_seed
 from ..look.configuration import LookConfiguration
 from .options import SET_EXAMPLE, add_configuration, add_data, add_hardware, add_output
 from .training import run_training
@@ -77,8 +77,9 @@ def run_look(options: argparse.Namespace) -> int:
     configuration = _with_classes_of(model, configuration)
 
     def begin(hardware: Hardware) -> None:
-        numbers = [each.number for each in find_pictures(options.data)]
-        split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
+        numbers, data = [each.number for each in find_pictures(options.data)], configuration.data
+        earlier = split_beside(model, options.data)
+        split = split_by_seed(numbers, data.validation, 0.0, data.split_seed, earlier)
         begin_look_run(
             options.output,
             options.data,
@@ -91,8 +92,9 @@ def run_look(options: argparse.Namespace) -> int:
             glance=glance,
             start=start,
         )
-        counts = f"{len(split.training)} for training, {len(split.validation)} for validation"
-        print(f"{options.data}: {len(numbers)} pictures: {counts}", flush=True)
+        count = [len(each) for each in asdict(split).values()]
+        parts = f"{count[0]} for training, {count[1]} for validation, {count[2]} for test"
+        print(f"{options.data}: {sum(count)} pictures: {parts}", flush=True)
 
     return run_training(options, options.output, partial(_load, options.output, None), _report, begin, alone=True)
 

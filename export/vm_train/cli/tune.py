@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from ..tuning.training import Tuning
 
 _FEW = 25
-"""Frames for training; with fewer, the share of found boxes varied by half between seeds (docs/own-frames.md)."""
+"""Frames for training; with fewer, the share of found boxes varied by half between seeds
+(benchmarks/experiments/fine-tuning.md)."""
 
 
 def tune_parser() -> argparse.ArgumentParser:

@@ -55,7 +55,7 @@ class PictureFolder:
     def lacking(self, numbers: Iterable[str]) -> list[str]:
         """A line for each of some pictures that lacks a file."""
         missing = {each: [part for part in PARTS if part not in self._files[each]] for each in sorted(numbers)}
-        return [f"picture {number} lacks its {' and '.join(parts)}" for number, parts in missing.items() if parts]
+        return [f"picture {number}: lacks its {' and '.join(parts)}" for number, parts in missing.items() if parts]
 
     def write(self, name: FileName, content: bytes) -> None:
         """Write a file of a picture, unless it is there already. Raises InputError if the folder has another one."""

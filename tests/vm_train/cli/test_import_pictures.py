@@ -6,6 +6,7 @@ from vm_embedded.errors import InputError
 from vm_train.cli.import_pictures import import_parser, run_import
 
 from ..formats.test_picture_example import reference_example, written
+from ..formats.test_shards import tar_of
 
 
 def test_the_command_imports_and_names_what_it_skipped(tmp_path, capsys):
@@ -26,6 +27,15 @@ def test_the_command_shows_the_first_faults_only_and_fails_if_nothing_was_import
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 21
     assert said[-1] == "vm-train: skipped 3 more"
+
+
+def test_names_in_an_archive_do_not_control_the_terminal(tmp_path, capsys):
+    archive = tar_of(tmp_path / "a.tar", [("\x1b[2J.jpg", b""), ("\x1b[2J", b"")])
+    with pytest.raises(InputError, match="found no usable picture"):
+        run_import(import_parser().parse_args([str(archive), str(tmp_path / "out")]))
+    said = capsys.readouterr().err
+    assert "lacks its mask and lens" in said
+    assert "\x1b" not in said
 
 
 @pytest.mark.parametrize(

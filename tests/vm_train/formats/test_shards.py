@@ -144,9 +144,9 @@ def test_pictures_that_lack_a_file_are_named_each_time(files, tmp_path):
     archive = tar_of(tmp_path / "a.tar", [("000.jpg", files["image000.jpg"]), ("readme.txt", b""), ("x.seg.png", b"")])
     for _ in range(2):
         made = imported([archive], tmp_path / "out", strict=False)
-        assert (made.count, made.skipped) == (0, ("picture 000 lacks its mask and lens",))
+        assert (made.count, made.skipped) == (0, ("picture 000: lacks its mask and lens",))
         assert made.remarks == (f"{archive}: left out 2 other files, for example x.seg.png",)
-    with pytest.raises(InputError, match="picture 000 lacks its mask and lens; 1 pictures lack a file"):
+    with pytest.raises(InputError, match="picture 000: lacks its mask and lens; 1 pictures lack a file"):
         imported([archive], tmp_path / "out")
     rest = [(by_key(name), files[name]) for name in ("mask000.png", "lens000.yaml")]
     assert imported([archive, tar_of(tmp_path / "b.tar", rest)], tmp_path / "out").count == 1
