@@ -30,7 +30,7 @@ from .look_checkpoint import LookCheckpoint
 from .mesh_networks import MeshNetwork, model_outputs
 from .plain_graph import plain_model
 from .runs_graph import runs_model
-from .strong_self_test import strong_self_test
+from .self_testing import strong_self_test
 
 LARGEST_DIFFERENCE = 1e-4
 """Largest difference of an answer that is allowed between ONNX Runtime and torch."""

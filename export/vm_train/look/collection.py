@@ -14,10 +14,10 @@ from vm_embedded.errors import GeometryError, InputError
 
 from .chunks import collect_chunks
 from .labels import OBJECT, UNLABELED, VISIBLE, label_places
-from .observing import Item, Observer, items_of
+from .observing import Observer, RunPicture, items_of
 from .patch_set import PatchChunk, PatchSet
 from .places import jittered_places, proposed_places, random_places
-from .run_folder import LookRun
+from .run import LookRun
 from .torch_look import TorchLook
 
 CHUNK = 100
@@ -41,7 +41,7 @@ class Collector:
         """The collector of a run. Raises InputError or ModelError."""
         return cls(run, Observer.of(run), TorchLook.of(run.glance()))
 
-    def __call__(self, item: Item) -> PatchChunk:
+    def __call__(self, item: RunPicture) -> PatchChunk:
         """The patches of a picture; none, and a fault, if it can't be used. In a strict run, raises InputError then."""
         try:
             return self._collect(item)
@@ -54,7 +54,7 @@ class Collector:
                 ) from error
             return PatchChunk(PatchSet.empty(self.run.configuration.patches.size), 0, 0, (fault,))
 
-    def _collect(self, item: Item) -> PatchChunk:
+    def _collect(self, item: RunPicture) -> PatchChunk:
         settings, seen = self.run.configuration.patches, self.observer.observe(item.files)
         observation, truths, view = seen.observation, seen.truths, seen.observation.view
         share = 1.0 if item.validates else _SURER

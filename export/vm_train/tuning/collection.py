@@ -22,8 +22,7 @@ from ..look.torch_look import TorchLook
 from .boxed_objects import objects_of
 from .candidates import find_candidates
 from .configuration import WindowSettings
-from .run_folder import TuningRun
-from .stages import network_before
+from .run import TuningRun
 from .windows import Windows, jittered_windows, random_windows
 
 CHUNK = 20
@@ -39,7 +38,7 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Collector:
+class WindowCollector:
     """Cuts the patches of a frame. contract: of the network that learns from them. radii (s,): of objects [px]."""
 
     look: TorchLook
@@ -50,9 +49,9 @@ class Collector:
     is_round: bool
 
     @classmethod
-    def of(cls, run: TuningRun, stage: str) -> Collector:
+    def of(cls, run: TuningRun, stage: str) -> WindowCollector:
         """The collector of a stage. Raises InputError or ModelError."""
-        before = network_before(run, stage)
+        before = run.network_before(stage)
         look = TorchLook(before.network, before.contract, TorchLook.of(before.glance))
         settings = run.configuration.patches
         return cls(look, before.contract, settings, run.radii, run.object_class, run.is_round)
@@ -82,7 +81,7 @@ def collect_windows(run: TuningRun, stage: str, workers: int, report: Callable[[
     InputError, and VisualMeshError if a worker was killed.
     """
     frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
-    make = partial(Collector.of, run, stage)
+    make = partial(WindowCollector.of, run, stage)
     paths = collect_chunks(frames, make, CHUNK, run.folder / "patches", f"{stage}-", workers, report)
-    size = network_before(run, stage).contract.size
+    size = run.network_before(stage).contract.size
     return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])

@@ -1,4 +1,4 @@
-"""vm-train look --boxes as a user types it: real processes that are stopped, killed and resumed."""
+"""vm-train tune as a user types it: real processes that are stopped, killed and resumed."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from vm_embedded.network.model_file import read_model
 from vm_export.look_weights import look_of
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.train import main
-from vm_train.learning.log import read_log
+from vm_train.runs.log import read_log
 from vm_train.tuning.boxed_objects import split_by_recording
 
 from ..drawn import draw_set
@@ -23,11 +23,11 @@ from ..drawn import draw_set
 
 @pytest.fixture(scope="module")
 def tune(frames, tiny):
-    """Runs vm-train look --boxes with one worker; more arguments override these."""
+    """Runs vm-train tune with one worker; more arguments override these."""
 
-    def run_tuning(output, *arguments, **options):
+    def run_tuning(output, *arguments, boxes=frames, **options):
         given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", 1, *arguments]
-        return run("look", "--boxes", frames, "-o", output, *given, **options)
+        return run("tune", boxes, "-o", output, *given, **options)
 
     return run_tuning
 
@@ -47,8 +47,9 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
         assert re.fullmatch(rf"{stage}: \d+ patches of your frames, \d+ of them show the object", lines[start])
         for epoch in (1, 2):
             assert re.fullmatch(
-                rf"{stage}, epoch {epoch} of 2: validation loss [\d.]+ for your frames, [\d.]+ for rendered patches, "
-                r"with \d+0% of the new weights; loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
+                rf"{stage}, epoch {epoch} of 2: validation loss [\d.]+ for your frames, [\d.]+ for rendered patches"
+                r"( \(the best so far\))?, with \d+0% of the new weights; "
+                r"loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
                 lines[start + epoch],
             )
     assert re.search(r"model.onnx: in 4 frames for the test, it finds \d+ of \d+ boxes and \d+ false", lines[7])
@@ -62,7 +63,7 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
     assert "with fewer than 25 frames for training" in done.stderr
     assert {path.name for path in folder.iterdir()} == {
         *("tune.toml", "run.json", "before.onnx", "rendered.npz", "patches", "glance.pt", "look.pt"),
-        *("log-glance", "log-look", "model.onnx", "report.html", "result.json", "pictures.json"),
+        *("log.jsonl", "tensorboard", "state.pt", "model.onnx", "report.html", "result.json", "pictures.json"),
     }
     result = json.loads((folder / "result.json").read_text())
     assert result["before"]["all"]["boxes"] == result["after"]["all"]["boxes"] > 0
@@ -94,9 +95,11 @@ def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_b
     lens = draw_set(tmp_path / "drawn", 1) / "lens0000.yaml"
     for image in seen.glob("*.jpg"):
         shutil.copy(lens, image.with_suffix(".yaml"))
-    done = tune(tmp_path / "run", "--boxes", seen, "--set", "data.validation=0", "--set", "data.test=0")
+    done = tune(tmp_path / "run", "--set", "data.validation=0", "--set", "data.test=0", boxes=seen)
     lines = done.stdout.splitlines()
-    assert re.match(r"glance, epoch 1 of 2: validation loss [\d.]+ for rendered patches, with ", lines[2])
+    assert re.match(
+        r"glance, epoch 1 of 2: validation loss [\d.]+ for rendered patches \(the best so far\), with ", lines[2]
+    )
     model = tmp_path / "run" / "model.onnx"
     assert lines[7:] == [
         f"{model}: not measured, because no frames were held out",
@@ -125,23 +128,23 @@ def test_a_fine_tuning_stays_on_the_processor(tune, whole, tmp_path):
 
 def test_a_log_has_each_step_once(whole):
     folder, _ = whole
-    for stage in ("glance", "look"):
-        records = [record for _, record in read_log(folder / f"log-{stage}" / "log.jsonl")]
+    for stage in (1, 2):
+        records = [record for _, record in read_log(folder / "log.jsonl") if record["round"] == stage]
         assert [each["step"] for each in records if "loss" in each] == list(range(1, 9))
         assert [each["epoch"] for each in records if "epoch" in each] == [1, 2]
 
 
 def assert_same(folder, expected):
-    for name in ("model.onnx", "glance.pt", "look.pt", "result.json", "report.html", "log-look/log.jsonl"):
+    for name in ("model.onnx", "glance.pt", "look.pt", "result.json", "report.html", "log.jsonl"):
         assert (folder / name).read_bytes() == (expected / name).read_bytes(), name
 
 
 @pytest.mark.parametrize(
     ("how", "wait"),
     [
-        (signal.SIGKILL, "log-look/log.jsonl"),
+        (signal.SIGKILL, "tensorboard/round2"),
         pytest.param(signal.SIGINT, "run.json", marks=pytest.mark.long),
-        pytest.param(signal.SIGTERM, "log-glance/log.jsonl", marks=pytest.mark.long),
+        pytest.param(signal.SIGTERM, "log.jsonl", marks=pytest.mark.long),
         pytest.param(signal.SIGKILL, "patches/glance-00000.npz", marks=pytest.mark.long),
         pytest.param(signal.SIGTERM, "patches/look-00000.npz", marks=pytest.mark.long),
         pytest.param(signal.SIGKILL, "model.onnx", marks=pytest.mark.long),
@@ -150,7 +153,7 @@ def assert_same(folder, expected):
 def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, wait, whole, frames, tiny, tmp_path):
     folder = tmp_path / "run"
     given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", 1]
-    run_and_stop(how, folder, wait, 0, "look", "--boxes", frames, *given)
+    run_and_stop(how, folder, wait, 0, "tune", frames, *given)
     run("resume", folder, "--workers", 2)
     assert_same(folder, whole[0])
 
@@ -175,10 +178,10 @@ def test_changed_boxes_or_settings_are_refused(whole, frames, tmp_path):
 
 @pytest.fixture
 def complaint(frames, tmp_path, capsys):
-    """What vm-train look --boxes says about arguments that it can't use: one line."""
+    """What vm-train tune says about arguments that it can't use: one line."""
 
     def complain(*arguments):
-        assert main(["look", "-o", str(tmp_path / "run"), *map(str, arguments)]) == 1
+        assert main(["tune", "-o", str(tmp_path / "run"), *map(str, arguments)]) == 1
         error = capsys.readouterr().err
         assert error.count("\n") == 1
         return error
@@ -187,14 +190,10 @@ def complaint(frames, tmp_path, capsys):
 
 
 def test_mistakes_are_told_in_one_line(complaint, frames, tmp_path):
-    ball, boxes = ["--from", "ball-small"], ["--boxes", frames]
-    assert "give a folder of rendered pictures, DATA, or" in complaint(*ball)
-    assert "has no box of class ball" in complaint(*ball, *boxes)
-    assert "--names 0=ball" in complaint(*ball, *boxes)
-    assert "leave out DATA" in complaint(frames, *ball, *boxes)
-    assert "leave out --glance" in complaint(*ball, *boxes, "--glance", "x.pt")
-    assert "go with --boxes" in complaint(frames, *ball, "--names", "0=ball")
-    assert "patience" in complaint(*ball, *boxes, "--names", "0=ball", "--set", "training.patiense=3")
+    ball = ["--from", "ball-small", frames]
+    assert "has no box of class ball" in complaint(*ball)
+    assert "--names 0=ball" in complaint(*ball)
+    assert "patience" in complaint(*ball, "--names", "0=ball", "--set", "training.patiense=3")
     assert not (tmp_path / "run").exists()
 
 
@@ -208,14 +207,14 @@ def test_boxes_that_are_only_in_the_test_leave_nothing(complaint, frames, tmp_pa
     splits = {seed: split_by_recording(pictures, 0.3, 0.3, seed).test for seed in range(99)}
     seed = next(seed for seed, taken in splits.items() if pictures[int(taken[0])].image.name[0] == "b")
     options = ("--names", "0=ball", "--set", f"data.split_seed={seed}", "--set", "data.test=0.3")
-    assert "part for training, has no box" in complaint("--from", "ball-small", "--boxes", folder, *options)
+    assert "part for training, has no box" in complaint(folder, "--from", "ball-small", *options)
     assert not (tmp_path / "run").exists()
 
 
 def test_strict_refuses_faults_before_it_writes_anything(frames, tmp_path, tune):
     damaged = shutil.copytree(frames, tmp_path / "damaged")
     next(path for path in sorted(damaged.glob("*.txt")) if path.read_text()).write_text("0 0.5\n")
-    error = tune(tmp_path / "run", "--boxes", damaged, "--strict", code=1).stderr
+    error = tune(tmp_path / "run", "--strict", boxes=damaged, code=1).stderr
     assert "has 2 values" in error
     assert "leave out --strict" in error
     assert not (tmp_path / "run").exists()
@@ -224,13 +223,11 @@ def test_strict_refuses_faults_before_it_writes_anything(frames, tmp_path, tune)
 def test_a_class_without_rendered_patches_needs_a_run(whole, tmp_path, complaint, frames):
     shown = look_of(read_model(model_path("ball-small")))
     assert shown.contract.object_class == "ball"
-    assert "holds no training" in complaint(
-        "--from", "ball-small", "--boxes", frames, "--names", "0=ball", "--rendered", tmp_path
-    )
+    assert "holds no training" in complaint(frames, "--from", "ball-small", "--names", "0=ball", "--rendered", tmp_path)
 
 
 def test_tune_config_prints_what_config_reads(tmp_path, tune):
-    text = run("tune-config").stdout
+    text = run("config", "tune").stdout
     assert "[training]" in text
     path = tmp_path / "tune.toml"
     path.write_text(text.replace("epochs = 8", "epochs = 0"))
