@@ -37,7 +37,7 @@ LARGEST_DIFFERENCE = 1e-4
 
 _WIDEST = {"convolution": 64, "separable": 32, "dense": 1024}
 """The largest width of a layer, by kind, for which the layout `runs` is faster. Convolutions and separable ones are
-measured (docs/performance.md); dense layers have no look-ups, so their width hardly matters."""
+measured (experiments/speed.md); dense layers have no look-ups, so their width hardly matters."""
 
 _CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
 
