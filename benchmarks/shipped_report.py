@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.field import RESULTS as FIELD_RESULTS
 from benchmarks.field import figures
-from benchmarks.report import DOCS, README, fill, number, table
+from benchmarks.report import DOCS, EXPERIMENTS, README, fill, number, table
 from benchmarks.shipped import METERS, NETWORKS, RANGES, RECIPES, RESULTS, SETS
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.look_contract import LookContract
@@ -19,6 +19,7 @@ from vm_embedded.network.model_file import read_model
 from vm_workstation.plots import new_figure, save_figure
 
 PAGE = DOCS / "results.md"
+MORE = EXPERIMENTS / "networks.md"
 COLORS = {"ball": "#d95f02", "ball-small": "#7570b3", "soccer": "#1b9e77"}
 
 
@@ -119,12 +120,13 @@ def grid(found: dict[str, Any]) -> str:
     return table(["lens, picture [px]", *(f"{height} m" for height in heights)], rows)
 
 
-def field_features(found: dict[str, Any]) -> str:
-    """Points by class and features of the field, on each test set."""
+def field_features(found: dict[str, Any], points: bool) -> str:
+    """Features of the field on each test set, or the F1 of the mesh points by class."""
     columns = [list(figures(each["f1"], each["features"])) for each in found["sets"].values()]
     rows = [
         [same[0].name, *("-" if each.value is None else f"{each.value:.3f}" for each in same)]
         for same in zip(*columns, strict=True)
+        if same[0].name.startswith("F1 of") == points
     ]
     return table(["measure", *found["sets"]], rows)
 
@@ -285,17 +287,18 @@ were rare or absent.{WEAK if name == "soccer" else ""}
 
 
 def main() -> None:
-    found = json.loads(RESULTS.read_text())
+    found, field = json.loads(RESULTS.read_text()), json.loads(FIELD_RESULTS.read_text())
     made = {
         "networks on fields": networks(found, "field"),
         "networks in clutter": networks(found, "clutter"),
         f"{DEFAULT} by distance": by_distance(found["networks"][DEFAULT]["field"]),
+        "features of the field": field_features(field, points=False),
     }
-    made["proposals"] = proposals(found)
-    made["features of the field"] = field_features(json.loads(FIELD_RESULTS.read_text()))
     if found["grid"]:
         made["grid"] = grid(found)
-    made["false an hour"] = table(
+    fill(PAGE, made)
+    more = {"proposals": proposals(found), "points of the field": field_features(field, points=True)}
+    more["false an hour"] = table(
         ["network", "test pictures", "false balls per picture", "per hour at 30 frames per second"],
         [
             [name, each, number(sets[each]["all"]["false_per_picture"], 3), f"{sets[each]['false_an_hour']:,}"]
@@ -303,7 +306,7 @@ def main() -> None:
             for each in SETS
         ],
     )
-    fill(PAGE, made)
+    fill(MORE, more)
     fill(README, {"accuracy": accuracy(found)})
     for name in found["networks"]:
         model_path(name).with_suffix(".md").write_text(card(found, name))
