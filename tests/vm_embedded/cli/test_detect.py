@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import shutil
 import signal
 import subprocess
@@ -71,9 +72,12 @@ def test_a_good_configuration_without_a_camera_says_so(camera, end, tmp_path):
     assert run("--config", tmp_path / "vm.toml", *camera, "--check-config").stdout.endswith(end + "\n")
 
 
-def test_every_setting_is_an_option():
+def test_every_setting_is_in_the_file_and_those_of_a_call_are_options():
     options = {option for action in parser()._actions for option in action.option_strings}
-    assert {"--" + each.name.replace("_", "-") for each in fields(Settings)} <= options
+    settings = {each.name for each in fields(Settings)}
+    of_a_robot = {"spinning", "pitch_step", "roll_step", "cache_mib", "max_around", "max_widths", "min_visible"}
+    assert settings <= set(re.findall(r"^(?:# )?(\w+) =", run("--print-config").stdout, re.MULTILINE))
+    assert {"--" + name.replace("_", "-") for name in settings - of_a_robot} <= options
 
 
 def test_more_threads_than_cores_give_the_same_answer():

@@ -275,14 +275,6 @@ def test_files_of_others_stay(capsys, data, tmp_path, name):
     assert contents(tmp_path) == {f"out/{name}": b"[1, 2]"}
 
 
-def test_the_figure_alone_needs_no_model(tmp_path):
-    done = run("points", "-o", tmp_path / "figure.svg", "--intersections", "3", "--equal-at", "4")
-    assert "visual" in done.stdout
-    assert (tmp_path / "figure.svg").read_text().startswith("<?xml")
-    assert ".png or .svg" in run("points", "-o", tmp_path / "figure.txt", code=1).stderr
-    assert "diameter" in run("points", "-o", tmp_path / "figure.svg", "--height", "0.1", code=1).stderr
-
-
 def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
     folder = draw_set(tmp_path / "set", 1)
     for name in ("image.jpg", "mask.png", "lens.yaml", "scene.json"):

@@ -25,7 +25,7 @@ depth = 1
 width = 8
 [training]
 epochs = 3
-looks = 2
+repeats = 2
 batch = 4
 optimizer = "muon"
 rate = 0.02
@@ -125,7 +125,7 @@ def test_pictures_that_leave_bases_unknown_are_a_remark(data, tmp_path):
         scene.unlink()
     path = tmp_path / "train.toml"
     posts = CLASSES.replace('line = { kind = "area"', 'goal = { kind = "upright"')
-    path.write_text(posts + OCTAVES.replace("epochs = 3\nlooks = 2", "epochs = 1"))
+    path.write_text(posts + OCTAVES.replace("epochs = 3\nrepeats = 2", "epochs = 1"))
     done = run(tmp_path / "data", "-o", tmp_path / "run", "--config", path, *ONE)
     assert "vm-train: 4 pictures have no sceneX.json: from them, the network does not learn" in done.stderr
     assert "the base of a goal" in done.stderr
