@@ -301,7 +301,7 @@ def test_a_network_of_the_package_is_fine_tuned_as_a_user_types_it(frames, tmp_p
     assert trained.stdout.endswith(f"\nnext: vm-export {folder / 'model.pt'} --look {folder / 'start.onnx'}\n")
     made = Checkpoint.load(folder / "model.pt").manifest
     assert (made.any_radius, made.sampling, made.colors) == (True, "footprint", "relative")
-    assert json.loads((folder / "run.json").read_text())["start"]["file"] == "start.onnx"
+    assert "start.onnx" in json.loads((folder / "run.json").read_text())["made_from"]
     split = json.loads((folder / "pictures.json").read_text())
     assert split["validation"] == [f"sunday_image000{number}" for number in range(4)]
 
