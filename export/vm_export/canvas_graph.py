@@ -1,4 +1,4 @@
-"""The graph of the layout `canvas`: ordinary convolutions, all in the block format of ONNX Runtime.
+"""The graph of a network on a canvas: ordinary convolutions, all in the block format of ONNX Runtime.
 
 vm_embedded/network/canvas_layout.py prepares its inputs. Batch normalization is folded into the weights.
 """
@@ -22,7 +22,7 @@ _LARGEST = 60.0
 
 
 def canvas_model(network: CanvasNetwork, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in the layout `canvas`.
+    """The bytes of an ONNX model.
 
     Inputs: points (1, 3, rows, columns) float32 and shown (1, 1, rows, columns) bool, as CanvasLayout gives them.
     Output: probabilities (1, C + 4 P, rows, columns) float32, which end with four numbers for each class with peaks.

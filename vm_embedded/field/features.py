@@ -11,6 +11,10 @@ import numpy as np
 from ..arrays import Floats, Singles
 
 
+UPRIGHTS = {"goal": "post", "robot": "robot"}
+"""What the uprights of a class are, by its name."""
+
+
 @dataclass(frozen=True, eq=False)
 class Upright:
     """Something that stands on the plane: a goal post, or a robot or another obstacle.
@@ -18,8 +22,7 @@ class Upright:
     class_name: post or robot. position (2,) [m]: its base, which is the middle of a post's foot, or the front of a
     robot's foot, in the direction of its middle. distance [m]: from the camera to the base. bearing (3,): unit vector
     from the camera to the base. pixel (2,) [px]: of the base; NaN outside of the picture. width [m]: as seen from the
-    camera. confidence: calibrated probability of a close look; if the class has none, the probability of a
-    peak; if it has no peaks either, the mean probability of its points; 0 to 1.
+    camera. confidence: calibrated probability, 0 to 1.
     """
 
     class_name: str

@@ -56,7 +56,7 @@ def begin_fine_tuning(options: argparse.Namespace) -> int:
     from ..tuning.run_folder import BoxSource, begin_tuning
 
     _check_device(options.device)
-    others = {"DATA": options.data, "--glance": options.glance, "--start": options.start}
+    others = {"DATA": options.data, "--start": options.start}
     given = [name for name, value in others.items() if value is not None]
     if given:
         raise InputError(f"--boxes fine-tunes the close look that {options.model} has: leave out {' and '.join(given)}")
@@ -92,12 +92,6 @@ def _describe(run: TuningRun, boxes: Path) -> None:
     """Print the numbers of frames, and what is left out."""
     from ..tuning.boxed_objects import divided
 
-    look = run.before.manifest.look
-    if look is not None and look.is_wide:
-        print(
-            f"{run.model}: its wide look is left out; it would not know your objects of class {run.object_class}",
-            flush=True,
-        )
     recordings = len({each.recording for each in run.pictures})
     split = run.split
     count = len(split.training), len(split.validation), len(split.test)

@@ -34,7 +34,7 @@ def look_parser() -> argparse.ArgumentParser:
     made = Parser(
         prog="vm-train look",
         description="Train the close look of a mesh network: a small network that judges a patch of the picture at "
-        "each proposal of the mesh network. Or, with --boxes, fine-tune the one that a model file has, on the CPU. You "
+        "each peak of the mesh network. Or, with --boxes, fine-tune the one that a model file has, on the CPU. You "
         "can stop or kill it at any time: vm-train resume continues. On a CPU, the final network is the same as "
         "without the stop.",
     )
@@ -47,21 +47,15 @@ def look_parser() -> argparse.ArgumentParser:
         required=True,
         dest="model",
         metavar="MODEL",
-        help="mesh network whose proposals it judges: a checkpoint (.pt), a model file (.onnx), or a network of the "
+        help="mesh network whose peaks it judges: a checkpoint (.pt), a model file (.onnx), or a network of the "
         f"package ({', '.join(SHIPPED)})",
-    )
-    made.add_argument(
-        "--glance",
-        metavar="LOOK",
-        help="glance that judges first; the new close look judges what it passes on, and its file has both: a look.pt, "
-        "or the close look of a model file (.onnx) or of a network of the package",
     )
     made.add_argument(
         "--start",
         metavar="LOOK",
         help="begin with the weights of a trained close look, not with random ones: a look.pt, a model file (.onnx), "
-        f"or a network of the package ({', '.join(SHIPPED)}). Its patches and layers, its glance, and training.rate "
-        "0.005 become the defaults",
+        f"or a network of the package ({', '.join(SHIPPED)}). Its patches and layers, and training.rate 0.005 "
+        "become the defaults",
     )
     made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
     made.add_argument(
@@ -129,9 +123,6 @@ def run_look(options: argparse.Namespace) -> int:
         raise InputError("--names, --format and --rendered go with --boxes: leave them out, or give --boxes DIR")
     check_device(options.device)
     start, configuration = _start_and_configuration(options)
-    glance = start.glance if start else None
-    if options.glance is not None:
-        glance = LookStart.load(model_path(options.glance), configuration.patches.object_class).look
     model = model_path(options.model)
     configuration = _with_classes_of(model, configuration)
     numbers = [each.number for each in find_pictures(options.data)]
@@ -146,7 +137,6 @@ def run_look(options: argparse.Namespace) -> int:
             str(options.model),
             strict=options.strict,
             threads=options.threads or 1,
-            glance=glance,
             start=start,
         )
         count = len(split.training), len(split.validation)
@@ -211,8 +201,5 @@ def _train(folder: Path, moved_to: Path | None, options: argparse.Namespace) -> 
             with stop_requests() as stop_requested:
                 if not train_look(run, collected, hardware, stop_requested):
                     raise KeyboardInterrupt
-    if run.glance_sha256 is None:
-        behind = f"--from {run.mesh} --glance {run.look_path} -o {folder}-look"
-        print(f"next, to use it as a glance: vm-train look {run.data} {behind}")
     print(f"next: vm-export {run.mesh} --look {run.look_path} -o {folder / 'model.onnx'}")
     return EXIT_OK

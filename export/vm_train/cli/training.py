@@ -15,7 +15,7 @@ from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError, VisualMeshError
-from vm_embedded.field.uprights import KINDS
+from vm_embedded.field.features import UPRIGHTS
 from vm_embedded.files import exists
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
@@ -158,7 +158,7 @@ def _begin(
 
 def _without_bases(configuration: TrainConfiguration, pictures: Sequence[PictureFiles], is_streamed: bool) -> str:
     """A remark if pictures don't tell where the uprights stand whose bases the network should learn; else ""."""
-    names = [each for each in configuration.manifest.peaks if each in KINDS]
+    names = [each for each in configuration.manifest.peaks if each in UPRIGHTS]
     missing = len(pictures) if is_streamed else sum(not exists(each.scene) for each in pictures)
     if not names or not missing:
         return ""

@@ -17,7 +17,6 @@ from .summary import (
     calibration,
     field_tables,
     object_table,
-    passed_on,
     point_table,
     proposal_counts,
     proposal_tables,
@@ -69,8 +68,6 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
     for name, found in scores["proposals"].items():
         tables = "".join(html_table(*each) for each in proposal_tables(found))
         parts.append(f"<h2>Proposals for class {escape(name)}</h2><p>{escape(proposal_counts(found))}.</p>")
-        if name in scores["passed"]:
-            parts.append(f"<p>{escape(passed_on(scores['passed'][name]))}.</p>")
         parts.append(f'<div class="strip">{tables}</div>')
     parts.append(_plot("proposals", plots, about))
     for heading, pictures in strips.items():

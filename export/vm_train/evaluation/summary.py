@@ -22,8 +22,6 @@ def lines(scores: Scores) -> str:
         rows += ["", f"objects of class {name}", *aligned([heading, *body]), calibration(scores["calibration"][name])]
     for name, found in scores["proposals"].items():
         rows += ["", f"proposals for class {name}: {proposal_counts(found)}"]
-        if name in scores["passed"]:
-            rows.append(passed_on(scores["passed"][name]))
         for heading, body in proposal_tables(found):
             rows += aligned([heading, *body])
     for name, (heading, body) in field_tables(scores["field"]).items():
@@ -76,12 +74,6 @@ def calibration(found: Scores) -> str:
 def proposal_counts(found: Scores) -> str:
     """The number of proposals per picture."""
     return f"{as_number(found['mean_count'], 1)} per picture, at most {found['largest_count']}"
-
-
-def passed_on(found: Scores) -> str:
-    """What a glance passes on of the proposals."""
-    near = as_percent(found["all"]["recall_0.5"])
-    return f"The glance passes on {proposal_counts(found)}; {near} of the true objects have one within 0.5 radii"
 
 
 def proposal_tables(found: Scores) -> list[Table]:

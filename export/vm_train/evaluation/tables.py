@@ -46,7 +46,6 @@ def as_json(evaluation: Evaluation, threshold: float) -> dict[str, Any]:
             name: {"min_visible": scores.min_visible, "min_radius": scores.min_radius, **scores.as_dict()}
             for name, scores in evaluation.proposals.items()
         },
-        "passed": {name: scores.as_dict() for name, scores in evaluation.passed.items()},
         "field": {} if evaluation.features is None else evaluation.features.as_dict(),
     }
 

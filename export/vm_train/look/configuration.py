@@ -56,17 +56,16 @@ class PatchSettings:
         "apparent radii of the object",
         (0.5, 8.0),
     )
-    above: float = number(
-        0.003, "probability of a mesh point from which it counts for a proposal; lower: more proposals", "", (0.0, 0.99)
-    )
     passes: int = number(
-        3,
-        "on the robot: how often a proposal is judged at most; each further pass cuts a new patch "
-        "around the center that the previous pass found",
+        1,
+        "on the robot: how often a peak is judged at most; each further pass cuts a new patch around the center that the "
+        "previous pass found",
         "",
         (1, 4),
     )
-    proposals: int = number(40, "largest number of proposals of the mesh network in a picture", "", (1, 1000))
+    max_proposals: int = number(
+        10, "largest number of peaks that it judges in a picture, here and on the robot", "", (1, 128)
+    )
     jittered: int = number(6, "patches beside true objects in a training picture with objects", "", (0, 1000))
     jitter: float = number(0.6, "largest distance of these from the true center", "apparent radii", (0.0, 1.0))
     size_jitter: float = number(

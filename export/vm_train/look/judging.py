@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask
-from vm_embedded.detection.looking import look_closely
+from vm_embedded.detection.looking import judge_peaks
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -61,8 +61,7 @@ class Judge:
     @classmethod
     def of(cls, run: LookRun, network: LookNetwork, contract: LookContract) -> Judge:
         """The judge of a run. network: not calibrated yet. Raises InputError or ModelError."""
-        settings = Settings(max_proposals=run.configuration.patches.proposals, min_confidence=0.0)
-        return cls(Observer.of(run), TorchLook(network, contract, TorchLook.of(run.glance())), settings)
+        return cls(Observer.of(run), TorchLook(network, contract), Settings(min_confidence=0.0))
 
     def __call__(self, item: Item) -> Found:
         """The objects in a picture; none if it can't be used."""
@@ -70,7 +69,8 @@ class Judge:
             seen = self.observer.observe(item.files)
         except (InputError, GeometryError):  # was reported when the patches were collected
             return Found(np.empty(0), np.empty(0, dtype=np.bool_), 0, 0)
-        judged = look_closely(seen.observation, self.look, seen.probabilities, self.settings, Stopwatch())
+        name = self.observer.object_class
+        judged = judge_peaks(seen.observation, name, self.look, self.settings, Stopwatch())
         kept = sorted((each for each in judged if each.reason is None), key=lambda each: -each.confidence)
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
         found = label_places(Tangents.at(seen.observation.view, centers), seen.truths)

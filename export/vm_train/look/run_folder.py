@@ -1,7 +1,7 @@
 """The folder of a training of a close look: what it was begun with, and what it has produced.
 
 look.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are. mesh.onnx or
-mesh.pt: a copy of the mesh network. glance.pt: a copy of the glance, if there is one. start.pt: a copy of the look
+mesh.pt: a copy of the mesh network. start.pt: a copy of the look
 network that the training begins with, if there is one. patches/: the patches, in chunks. state.pt: the state to resume
 from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json: what it finds in the
 validation pictures, and how often its probabilities are right.
@@ -27,17 +27,16 @@ from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject
 from ..learning.folder_access import check_unused, description
 from .configuration import LookConfiguration
-from .judged import check_glance, judged_class, load_mesh, upright_radius_of
+from .judged import judged_class, load_mesh, upright_radius_of
 
 KIND = "look"
-_FORMAT = 4
-_GLANCE, _START = "glance.pt", "start.pt"
+_FORMAT = 5
+_START = "start.pt"
 _FILES = (
     "look.toml",
     "pictures.json",
     "mesh.onnx",
     "mesh.pt",
-    _GLANCE,
     _START,
     "patches",
     "state.pt",
@@ -52,9 +51,8 @@ _FILES = (
 class LookRun:
     """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
 
-    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. glance_sha256,
-    start_sha256: digests of the checkpoints of the glance and of the network to begin with, None without one.
-    object_class: class to judge. strict: whether a picture that can't be used ends the training. threads: number of
+    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. start_sha256:
+    digest of the checkpoint of the network to begin with, None without one. object_class: class to judge. strict: whether a picture that can't be used ends the training. threads: number of
     computing threads; a resumed training takes the same.
     """
 
@@ -65,7 +63,6 @@ class LookRun:
     model: str
     mesh: Path
     mesh_sha256: str
-    glance_sha256: str | None
     start_sha256: str | None
     object_class: str
     strict: bool
@@ -93,18 +90,14 @@ class LookRun:
 
     @property
     def configuration_sha256(self) -> str:
-        """Digest of the configuration, the split, the mesh network, the glance and the network to begin with."""
-        networks = self.mesh_sha256, self.glance_sha256, self.start_sha256
+        """Digest of the configuration, the split, the mesh network and the network to begin with."""
+        networks = self.mesh_sha256, self.start_sha256
         text = json.dumps([asdict(self.configuration), asdict(self.split), *networks])
         return hashlib.sha256(text.encode()).hexdigest()
 
     def subject(self) -> ExactSubject:
         """The mesh network. Raises InputError or ModelError."""
         return load_mesh(self.mesh)
-
-    def glance(self) -> LookCheckpoint | None:
-        """The network that judges the proposals first, if there is one. Raises InputError or ModelError."""
-        return None if self.glance_sha256 is None else LookCheckpoint.load(self.folder / _GLANCE)
 
     def start(self) -> LookCheckpoint | None:
         """The look network to begin with, if there is one. Raises InputError or ModelError."""
@@ -126,11 +119,9 @@ def begin_look_run(
     *,
     strict: bool = False,
     threads: int = 1,
-    glance: LookCheckpoint | None = None,
     start: LookCheckpoint | None = None,
 ) -> LookRun:
-    """Write the files of a new training. model: file of the mesh network; name: as the user named it. glance: network
-    that goes before the new one. start: network to begin with, which fits the configuration.
+    """Write the files of a new training. model: file of the mesh network; name: as the user named it. start: network to begin with, which fits the configuration.
 
     Raises InputError, also if the folder holds a training, and ModelError.
     """
@@ -138,8 +129,6 @@ def begin_look_run(
     _ = configuration.shape
     subject = load_mesh(model)
     object_class = judged_class(configuration, subject, name)
-    if glance is not None:
-        check_glance(glance, object_class, upright_radius_of(configuration, object_class))
     make_folder(folder / "patches")
     mesh = folder / f"mesh{model.suffix.lower()}"
     write_file(mesh, read_bytes(model))
@@ -151,7 +140,6 @@ def begin_look_run(
         model=name,
         mesh=mesh,
         mesh_sha256=subject.sha256,
-        glance_sha256=_saved(glance, folder / _GLANCE),
         start_sha256=_saved(start, folder / _START),
         object_class=object_class,
         strict=strict,
@@ -174,7 +162,6 @@ def read_look_run(folder: Path) -> LookRun:
             model=str(content["model"]),
             mesh=folder / str(content["mesh"]),
             mesh_sha256=str(content["mesh_sha256"]),
-            glance_sha256=None if content["glance_sha256"] is None else str(content["glance_sha256"]),
             start_sha256=None if content["start_sha256"] is None else str(content["start_sha256"]),
             object_class=str(content["object_class"]),
             strict=bool(content["strict"]),
@@ -188,9 +175,8 @@ def read_look_run(folder: Path) -> LookRun:
         )
     if run.subject().sha256 != run.mesh_sha256:
         raise InputError(f"{run.mesh} was changed since the training began: begin another one")
-    for name, sha256 in ((_GLANCE, run.glance_sha256), (_START, run.start_sha256)):
-        if sha256 is not None and _sha256(folder / name) != sha256:
-            raise InputError(f"{folder / name} was changed since the training began: begin another one")
+    if run.start_sha256 is not None and _sha256(folder / _START) != run.start_sha256:
+        raise InputError(f"{folder / _START} was changed since the training began: begin another one")
     return run
 
 
@@ -204,7 +190,6 @@ def _description(run: LookRun) -> dict[str, Any]:
         "model": run.model,
         "mesh": run.mesh.name,
         "mesh_sha256": run.mesh_sha256,
-        "glance_sha256": run.glance_sha256,
         "start_sha256": run.start_sha256,
         "object_class": run.object_class,
         "strict": run.strict,

@@ -10,7 +10,7 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.network.model_file import read_model
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookShape
-from vm_export.look_weights import look_of, upright_looks_of
+from vm_export.look_weights import looks_of
 
 from .configuration import LookConfiguration
 
@@ -27,7 +27,7 @@ class LookStart:
 
     @classmethod
     def load(cls, path: Path, object_class: str = "") -> LookStart:
-        """Read a look.pt, or the look of a model file (.onnx) at a class; "": its only one, or the one at objects.
+        """Read a look.pt, or the look of a model file (.onnx) at a class; "": its first one.
 
         Raises InputError or ModelError.
         """
@@ -45,7 +45,7 @@ class LookStart:
             "object_class": contract.object_class,
             "size": contract.size,
             "extent": contract.extent,
-            "above": contract.above,
+            "max_proposals": contract.max_proposals,
             "passes": contract.passes,
         }
         if contract.upright_radius:
@@ -72,8 +72,7 @@ def _listed(shape: LookShape) -> str:
 
 def _chosen(path: Path, object_class: str) -> LookCheckpoint:
     """The look of a model file at a class; see LookStart.load."""
-    model = read_model(path)
-    looks = ([look_of(model)] if model.look is not None else []) + upright_looks_of(model)
+    looks = looks_of(read_model(path))
     names = [each.contract.object_class for each in looks]
     if not looks:
         raise InputError(f"{path} has no close look")

@@ -142,25 +142,22 @@ class _Training:
         name, training, validation = self._run.object_class, found.training, found.validation
         print(f"training: {len(training)} patches, {training.objects} of them show the object {name}")
         print(f"validation: {len(validation)} proposals, {validation.objects} of them show the object {name}")
-        proposer = "the glance passes on" if self._run.glance_sha256 else "the mesh network proposes"
         share = 100.0 * found.proposed / found.objects if found.objects else math.nan
-        print(f"{proposer} {found.proposed} of {found.objects} visible objects ({share:.0f} %)")
+        print(f"the mesh network proposes {found.proposed} of {found.objects} visible objects ({share:.0f} %)")
         print("validation AP: average precision of the validation proposals, from 0 to 1", flush=True)
 
     def _finish(self, stop_requested: Callable[[], bool]) -> bool:
         """Calibrate the network on what it finds in the validation pictures, and write look.pt. False after a stop."""
         run, network, patches = self._run, self._trainer.network.cpu().eval(), self._run.configuration.patches
         round_kernels(network)
-        glance = run.glance()
         contract = LookContract(
             object_class=run.object_class,
             upright_radius=run.upright_radius,
             size=patches.size,
             extent=patches.extent,
-            above=patches.above,
+            max_proposals=patches.max_proposals,
             passes=patches.passes,
             channels=run.configuration.network.channels,
-            glance=None if glance is None else glance.contract,
         )
         found = self._judge(network, contract, stop_requested)
         if found is None:
@@ -171,7 +168,7 @@ class _Training:
         score = LookScore.of(logits, self._collected.validation)
         contract = replace(contract, provenance=self._provenance(score, result))
         examples = _examples(self._collected.validation, logits[:, 0])
-        look = LookCheckpoint(network, contract, examples, glance)
+        look = LookCheckpoint(network, contract, examples)
         source = f"{len(run.split.validation)} validation pictures of {printable(run.data.name)}"
         look.recalibrated(calibration.scale, calibration.offset, source).save(run.look_path)
         write_file(run.folder / "result.json", json.dumps(result.as_dict(), indent=1) + "\n")

@@ -11,7 +11,6 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.pyramid import Pyramid
-from vm_embedded.network.look_contract import LookContract
 
 from ..boxes.box import BoxedPicture
 from ..look.chunks import collect_chunks
@@ -22,8 +21,7 @@ from ..look.torch_look import TorchLook
 from .boxed_objects import objects_of
 from .candidates import find_candidates
 from .configuration import WindowSettings
-from .run_folder import TuningRun
-from .stages import network_before
+from .run_folder import TuningRun, tuned_look
 from .windows import Windows, jittered_windows, random_windows
 
 CHUNK = 20
@@ -40,22 +38,20 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Collector:
-    """Cuts the patches of a frame. contract: of the network that learns from them. radii (s,): of objects [px]."""
+    """Cuts the patches of a frame. look: the network before the fine-tuning. radii (s,): of objects [px]."""
 
     look: TorchLook
-    contract: LookContract
     settings: WindowSettings
     radii: Floats
     object_class: str
     is_round: bool
 
     @classmethod
-    def of(cls, run: TuningRun, stage: str) -> Collector:
-        """The collector of a stage. Raises InputError or ModelError."""
-        before = network_before(run, stage)
-        look = TorchLook(before.network, before.contract, TorchLook.of(before.glance))
-        settings = run.configuration.patches
-        return cls(look, before.contract, settings, run.radii, run.object_class, run.is_round)
+    def of(cls, run: TuningRun) -> Collector:
+        """The collector of a run. Raises InputError or ModelError."""
+        before = tuned_look(run.before)
+        look = TorchLook(before.network, before.contract)
+        return cls(look, run.configuration.patches, run.radii, run.object_class, run.is_round)
 
     def __call__(self, frame: Frame) -> PatchChunk:
         """The patches of a frame. Raises InputError if it can't be read any more."""
@@ -70,19 +66,18 @@ class Collector:
         )
         found = windows.label(objects)
         clear = found.labels != UNLABELED
-        patches = windows.part(clear).cut(pyramid, self.contract)
+        patches = windows.part(clear).cut(pyramid, self.look.contract)
         pictures = np.full(len(patches), frame.position, dtype=np.int32)
         return PatchChunk(PatchSet(patches, found.labels[clear], found.targets[clear], pictures))
 
 
-def collect_windows(run: TuningRun, stage: str, workers: int, report: Callable[[int], None]) -> PatchSet:
-    """Collect the patches of all frames for a stage, or read those that are collected.
+def collect_windows(run: TuningRun, workers: int, report: Callable[[int], None]) -> PatchSet:
+    """Collect the patches of all frames, or read those that are collected.
 
     workers: processes; 1 uses only this process. report: is called with the number of frames that are done. Raises
     InputError, and VisualMeshError if a worker was killed.
     """
     frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
-    make = partial(Collector.of, run, stage)
-    paths = collect_chunks(frames, make, CHUNK, run.folder / "patches", f"{stage}-", workers, report)
-    size = network_before(run, stage).contract.size
+    paths = collect_chunks(frames, partial(Collector.of, run), CHUNK, run.folder / "patches", "", workers, report)
+    size = tuned_look(run.before).contract.size
     return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])

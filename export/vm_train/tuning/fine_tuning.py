@@ -1,4 +1,4 @@
-"""Fine-tunes the close look of a model file on boxed frames, stage by stage. It can be resumed at any step."""
+"""Fine-tunes the close look of a model file on boxed frames. It can be resumed at any step."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ from .box_finding import LOOK_ALONE, Search, Trial
 from .boxed_objects import divided
 from .collection import collect_windows
 from .rendered_patches import read_rendered
-from .run_folder import REPORT, TuningRun
-from .stage_training import StagePatches, train_stage
-from .stages import LOOK, network_before, stages_of
+from .run_folder import REPORT, TuningRun, tuned_look
+from .training import TuningPatches, train_tuned
 
 
 def fine_tune(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) -> bool:
@@ -34,25 +33,21 @@ def fine_tune(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) 
     if (run.folder / REPORT).exists():
         print(f"{run.model_path}: the fine-tuning was finished already")
         return True
-    for stage in stages_of(run):
-        if run.stage_path(stage).exists():
-            continue
-        own = _collect(run, stage, workers, stop_requested)
-        before = network_before(run, stage)
+    if not run.look_path.exists():
+        own, before = _collect(run, workers, stop_requested), tuned_look(run.before)
         rendered = read_rendered(run.rendered_path, before.contract.size)
-        network = train_stage(run, stage, before, StagePatches.of(run, own, rendered), stop_requested)
+        network = train_tuned(run, before, TuningPatches.of(run, own, rendered), stop_requested)
         if network is None:
             return False
-        if stage == LOOK:
-            before = replace(before, contract=replace(before.contract, provenance=_provenance(run, before, own)))
-        replace(before, network=network).save(run.stage_path(stage))
+        contract = replace(before.contract, provenance=_provenance(run, before, own))
+        replace(before, network=network, contract=contract).save(run.look_path)
         run.state_path.unlink(missing_ok=True)
     _finish(run, workers, stop_requested)
     return True
 
 
-def _collect(run: TuningRun, stage: str, workers: int, stop_requested: Callable[[], bool]) -> PatchSet:
-    """The patches of a stage. Raises KeyboardInterrupt for a stop: the finished files of patches stay."""
+def _collect(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) -> PatchSet:
+    """The patches of the frames. Raises KeyboardInterrupt for a stop: the finished files of patches stay."""
     bar = ProgressBar(len(run.pictures), "vm-train")
 
     def report(done: int) -> None:
@@ -61,7 +56,7 @@ def _collect(run: TuningRun, stage: str, workers: int, stop_requested: Callable[
             raise KeyboardInterrupt
 
     try:
-        return collect_windows(run, stage, workers, report)
+        return collect_windows(run, workers, report)
     finally:
         bar.clear()
 
@@ -80,7 +75,7 @@ def _provenance(run: TuningRun, before: LookCheckpoint, own: PatchSet) -> Mappin
 
 def _finish(run: TuningRun, workers: int, stop_requested: Callable[[], bool]) -> None:
     """Write the model file and the report. Raises KeyboardInterrupt for a stop."""
-    look = LookCheckpoint.load(run.stage_path(LOOK))
+    look = LookCheckpoint.load(run.look_path)
     content, _ = attached(run.before.content, run.before.manifest, look)
     write_file(run.model_path, content)
     frames = run.part(run.held_out)

@@ -1,9 +1,8 @@
 """The folder of a fine-tuning: what it was begun with, and what it has produced.
 
 tune.toml: the configuration. run.json: where the boxes are. before.onnx: the model file that it began with.
-rendered.npz: rendered patches. patches/: patches of the user's frames. glance.pt, look.pt: the networks, when they are
-trained. state.pt: the state to resume from. log-glance/, log-look/: the records of each step. model.onnx: the new model
-file. pictures.json: the frames of each part. report.html, result.json: what both networks find in the held-out frames.
+rendered.npz: rendered patches. patches/: patches of the user's frames. look.pt: the network, when it is trained. state.pt:
+the state to resume from. log.jsonl, tensorboard/: the record of each step. model.onnx: the new model file. pictures.json: the frames of each part. report.html, result.json: what both networks find in the held-out frames.
 """
 
 from __future__ import annotations
@@ -19,13 +18,12 @@ from vm_embedded import __version__
 from vm_embedded.arrays import Floats
 from vm_embedded.config.sections import read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, ModelError
 from vm_embedded.files import write_file
-from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
-from vm_export.look_weights import look_of
+from vm_export.look_weights import looks_of
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
@@ -41,14 +39,14 @@ KIND = "tuning"
 REPORT = "report.html"
 """Name of the report, the last file that a fine-tuning writes."""
 
-_FORMAT = 2
+_FORMAT = 3
 _FILES = (
     "tune.toml",
     "before.onnx",
     "rendered.npz",
     "patches",
     "state.pt",
-    "glance.pt",
+    "log.jsonl",
     "look.pt",
     "model.onnx",
     REPORT,
@@ -114,21 +112,17 @@ class TuningRun:
         """The new model file."""
         return self.folder / "model.onnx"
 
-    def stage_path(self, stage: str) -> Path:
-        """File of a trained network."""
-        return self.folder / f"{stage}.pt"
-
     @property
-    def contract(self) -> LookContract:
-        """The contract of the look network that it began with; see `tuned_look`."""
-        look = self.before.manifest.look
-        assert look is not None  # begin_tuning refuses a model file without one
-        return look.chain[1] if look.is_wide else look
+    def look_path(self) -> Path:
+        """File of the trained network."""
+        return self.folder / "look.pt"
 
     @property
     def object_class(self) -> str:
-        """The class that the networks judge."""
-        return self.contract.object_class
+        """The class that the network judges."""
+        name = self.before.manifest.searched_class
+        assert name is not None  # begin_tuning refuses a model file without such a look
+        return name
 
     @property
     def is_round(self) -> bool:
@@ -146,13 +140,11 @@ class TuningRun:
 
 
 def tuned_look(model: ModelFile) -> LookCheckpoint:
-    """The close look of a model file, which a fine-tuning changes. A wide look behind it is left out: it would not
-    know the new objects, and there are no rendered patches for it, without which it would forget the others.
-
-    Raises ModelError if the file has no look.
-    """
-    look = look_of(model)
-    return look.glance if look.glance is not None and look.contract.is_wide else look
+    """The close look at objects of a model file, which a fine-tuning changes. Raises ModelError if it has none."""
+    for each in looks_of(model):
+        if each.contract.object_class == model.manifest.searched_class:
+            return each
+    raise ModelError(f"{model.path} has no close look at objects; vm-export --look attaches one")
 
 
 def begin_tuning(

@@ -1,4 +1,4 @@
-"""Training of one stage: a network learns from the user's patches and from rendered ones, and the best epoch stays.
+"""Training of a fine-tuning: a network learns from the user's patches and from rendered ones, and the best epoch stays.
 
 Patches without an object are drawn by the network's errors, which it learns at the beginning and in the middle.
 """
@@ -32,8 +32,8 @@ _RENDERED_VALIDATION = 5
 
 
 @dataclass(frozen=True, eq=False)
-class StagePatches:
-    """Patches of a stage: the user's own and rendered ones, each for training and for validation."""
+class TuningPatches:
+    """Patches of a fine-tuning: the user's own and rendered ones, each for training and for validation."""
 
     own: PatchSet
     rendered: PatchSet
@@ -41,7 +41,7 @@ class StagePatches:
     rendered_validation: PatchSet
 
     @classmethod
-    def of(cls, run: TuningRun, own: PatchSet, rendered: PatchSet) -> StagePatches:
+    def of(cls, run: TuningRun, own: PatchSet, rendered: PatchSet) -> TuningPatches:
         """Divide patches by the run's split."""
         validates = np.isin(own.pictures, np.array(run.split.validation, dtype=np.int64))
         shared = np.arange(len(rendered)) % _RENDERED_VALIDATION == 0
@@ -60,41 +60,33 @@ class StagePatches:
 
 
 @dataclass
-class StageProgress:
-    """How far a stage is, besides its weights; state.pt keeps these entries.
+class TuningProgress:
+    """How far a fine-tuning is, besides its weights; state.pt keeps these entries.
 
     validated: number of validated epochs. best: the lowest loss of the user's frames; best_epoch: its epoch, from 1,
     or 0.
     """
 
-    stage: str
     validated: int = 0
     best: float = math.inf
     best_epoch: int = 0
 
 
-def train_stage(
-    run: TuningRun, stage: str, before: LookCheckpoint, patches: StagePatches, stop_requested: Callable[[], bool]
+def train_tuned(
+    run: TuningRun, before: LookCheckpoint, patches: TuningPatches, stop_requested: Callable[[], bool]
 ) -> LookNetwork | None:
-    """Train the network of a stage from `before` on, and calibrate it. Returns None after a stop. Raises InputError."""
+    """Train a network from `before` on, and calibrate it. Returns None after a stop. Raises InputError."""
     state = read_state(run.state_path) if run.state_path.exists() else None
-    if state is not None and state["more"]["progress"]["stage"] != stage:
-        state = None  # it is left from a stage that is finished
-    return _Stage(run, stage, before, patches, state).run(stop_requested)
+    return _Training(run, before, patches, state).run(stop_requested)
 
 
-class _Stage:
-    """A stage in work, from its last state on."""
+class _Training:
+    """A training in work, from its last state on."""
 
     def __init__(
-        self,
-        run: TuningRun,
-        stage: str,
-        before: LookCheckpoint,
-        patches: StagePatches,
-        state: Mapping[str, Any] | None,
+        self, run: TuningRun, before: LookCheckpoint, patches: TuningPatches, state: Mapping[str, Any] | None
     ) -> None:
-        self._run, self._stage, self._patches = run, stage, patches
+        self._run, self._patches = run, patches
         settings = run.configuration
         self._recipe = settings.training
         self._total = self._recipe.epochs * self._recipe.steps
@@ -103,24 +95,22 @@ class _Stage:
         self._mixer = Mixer(old, patches.rendered_validation, self._recipe.forgetting)
         is_rendered = torch.arange(len(training)) >= len(patches.own)
         teacher = LookTeacher(old, self._recipe.distillation * is_rendered)
-        recipe = self._recipe.for_stage(stage)
+        recipe = self._recipe.as_look_recipe()
         self._trainer = LookTrainer(
             network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights, teacher
         )
-        self._progress, self._best = StageProgress(stage), _copy(network)
+        self._progress, self._best = TuningProgress(), _copy(network)
         if state is not None:
             self._trainer.load(state)
-            self._progress = StageProgress(**state["more"]["progress"])
+            self._progress = TuningProgress(**state["more"]["progress"])
             self._best = dict(state["more"]["best"])
         self._bar = ProgressBar(self._total, "vm-train", self._trainer.done)
 
     def run(self, stop_requested: Callable[[], bool]) -> LookNetwork | None:
         """Train until the end or a stop, and return the calibrated network of the best epoch; None after a stop."""
         own = self._patches.own
-        print(f"{self._stage}: {len(own)} patches of your frames, {own.objects} of them show the object", flush=True)
-        folder = self._run.folder / f"log-{self._stage}"
-        folder.mkdir(exist_ok=True)
-        with TrainingLog(folder, 1, self._trainer.done, self._progress.validated) as log:
+        print(f"{len(own)} patches of your frames, {own.objects} of them show the object", flush=True)
+        with TrainingLog(self._run.folder, 1, self._trainer.done, self._progress.validated) as log:
             while self._progress.validated < self._recipe.epochs and not self._is_late():
                 if not self._train_epoch(log, stop_requested):
                     return None
@@ -161,7 +151,7 @@ class _Stage:
         self._bar.clear()
         yours = "" if math.isnan(own) else f"{own:.3f} for your frames, "
         print(
-            f"{self._stage}, epoch {self._progress.validated} of {self._recipe.epochs}: validation loss {yours}"
+            f"epoch {self._progress.validated} of {self._recipe.epochs}: validation loss {yours}"
             f"{mixture.loss:.3f} for rendered patches, with {mixture.share:.0%} of the new weights; {learned}",
             flush=True,
         )
