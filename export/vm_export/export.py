@@ -50,9 +50,10 @@ def export(
 ) -> float:
     """Write the model file of a checkpoint and return the largest difference to torch of an answer.
 
-    looks: look networks to write into the same file. canary: a
-    picture that becomes its canary. ONNX Runtime runs the networks before the file is written. Raises ModelError if an
-    answer differs by more than LARGEST_DIFFERENCE, or a look does not fit the classes, and InputError if the picture does not show every class, or the file can't be written.
+    looks: look networks to write into the same file. canary: a picture that becomes its canary. ONNX Runtime runs the
+    networks before the file is written. Raises ModelError if an answer differs by more than LARGEST_DIFFERENCE, or a
+    look does not fit the classes, and InputError if the picture does not show every class, or the file can't be
+    written.
     """
     network = checkpoint.network.eval()
     provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}

@@ -62,11 +62,8 @@ def network_of(model: ModelFile) -> Checkpoint:
     manifest, foreign = model.manifest, f"{model.path}: its mesh network has other layers than vm-export writes"
     try:
         graph = _Graph(model.content)
-        network: MeshNetwork
-        if manifest.on_canvas:
-            network = read_canvas(graph.constants)
-        else:
-            network = _network(_plain(graph), manifest.neighbors)
+        on_graph = not manifest.on_canvas
+        network: MeshNetwork = _network(_plain(graph), manifest.neighbors) if on_graph else read_canvas(graph.constants)
         difference = largest_difference(model.content, network, manifest)
     except (KeyError, IndexError, ValueError, RuntimeError, InputError) as error:
         raise ModelError(f"{foreign}: {error}") from error

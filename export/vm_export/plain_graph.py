@@ -1,4 +1,4 @@
-"""The graph of a network on a graph, for any ONNX runtime: points as rows, one Gather and one matrix product per layer."""
+"""The ONNX graph of a network on a graph: points as rows, one Gather and one matrix product per layer."""
 
 from __future__ import annotations
 

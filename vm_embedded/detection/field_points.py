@@ -22,8 +22,8 @@ _LOWEST = 1e-3
 def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
     """Goal posts, robots, lines and border; None if the network has no class for any of them.
 
-    looks: look networks by class. Only a network with peaks for them shows posts and robots. Raises ModelError if a look
-    network does not run.
+    looks: look networks by class. Only a network with peaks for them shows posts and robots. Raises ModelError if a
+    look network does not run.
     """
     names = [each.name for each in observation.manifest.classes]
     if not set(ROLES) & set(names):

@@ -1,7 +1,8 @@
 """From an observation to objects on the plane.
 
-The peaks of a class are its objects, after a close look if there is one (`looking.py`). Without peaks, clusters of likely
-points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`, `judging.py`).
+The peaks of a class are its objects, after a close look if there is one (`looking.py`). Without peaks, clusters of
+likely points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`,
+`judging.py`).
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ def locate(
 ) -> tuple[tuple[Detection, ...], tuple[Detection, ...]]:
     """The objects that an observation shows, most confident first, and, with `explain`, the rejected candidates.
 
-    It searches only for classes of the kind "object". looks: look networks by class. watch: gets the stage cluster; with
-    peaks also propose, with a look look. Raises ModelError if a look network does not run.
+    It searches only for classes of the kind "object". looks: look networks by class. watch: gets the stage cluster;
+    with peaks also propose, with a look look. Raises ModelError if a look network does not run.
     """
     objects: list[Detection] = []
     rejected: list[Detection] = []

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..arrays import Floats, Singles
 
-
 UPRIGHTS = {"goal": "post", "robot": "robot"}
 """What the uprights of a class are, by its name."""
 

@@ -31,8 +31,8 @@ class Layout(ABC):
     A slot holds a point or nothing; an empty slot is a gap. Used as a mesh.PointGraph, its points are the slots.
 
     slots: (m,) point of each slot; n in gaps. places: (n,) slot of each point. original: (m,) True for the slots in
-    `places`, False for gaps and points of the mesh's margin. rays: (m, 3) of the slots' points, NaN in gaps. strips: (m,) strip of each
-    slot, -1 in gaps; None for a mesh without strips.
+    `places`, False for gaps and points of the mesh's margin. rays: (m, 3) of the slots' points, NaN in gaps. strips:
+    (m,) strip of each slot, -1 in gaps; None for a mesh without strips.
     """
 
     slots: Indices

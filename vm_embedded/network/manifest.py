@@ -191,8 +191,8 @@ class Manifest:
         for each in self.looks:
             if kinds[each.object_class] == "object" and each.upright_radius:
                 raise ModelError(
-                    f"the close look at {each.object_class!r} has an upright_radius of {each.upright_radius:g} m; for a "
-                    "class of kind object it must be 0"
+                    f"the close look at {each.object_class!r} has an upright_radius of {each.upright_radius:g} m; for "
+                    "a class of kind object it must be 0"
                 )
             if kinds[each.object_class] == "upright" and each.upright_radius < _SMALLEST_CIRCLE:
                 raise ModelError(

@@ -58,8 +58,8 @@ _Budget = Iterator[int]
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file's bytes, its manifest, and the SHA-256 of the bytes. looks: the ONNX files of its close looks, in the
-    manifest's order. canary: None if it has none."""
+    """A model file's bytes, its manifest, and the SHA-256 of the bytes. looks: the ONNX files of its close looks, in
+    the manifest's order. canary: None if it has none."""
 
     path: Path
     content: bytes
@@ -128,9 +128,7 @@ def _refuse_unknown_looks(metadata: dict[str, str], manifest: Manifest) -> None:
     known = {look_key(each.object_class) for each in manifest.looks}
     for key in metadata:
         if key.startswith(look_key("")) and key not in known:
-            raise ModelError(
-                f"its metadata has a close look at {key.removeprefix(look_key(''))}, its manifest has none"
-            )
+            raise ModelError(f"its metadata has {key}, its manifest has no such close look")
 
 
 def sealed(content: bytes) -> bytes:

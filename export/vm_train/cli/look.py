@@ -111,7 +111,6 @@ def run_look(options: argparse.Namespace) -> int:
     """Begin the training of a close look, train, and return the exit status. Raises VisualMeshError."""
     from ..learning.hardware import check_device
     from ..look.run_folder import begin_look_run
-    from ..look.start import LookStart
 
     if (options.workers or len(os.sched_getaffinity(0))) > 1:
         check_shared_memory()

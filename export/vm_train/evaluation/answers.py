@@ -51,8 +51,8 @@ class PictureAnswer:
     and the objects found, most confident first.
 
     proposals: for each class of kind object with a close look, the centers (c, 3) [m] of the peaks that it judges,
-    relative to the camera, in the frame of `Detection.bearing`. features: of the field, or None if the network has none.
-    manifest: with the radius of the objects that were looked for.
+    relative to the camera, in the frame of `Detection.bearing`. features: of the field, or None if the network has
+    none. manifest: with the radius of the objects that were looked for.
     """
 
     pixels: Floats

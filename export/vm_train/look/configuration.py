@@ -58,8 +58,8 @@ class PatchSettings:
     )
     passes: int = number(
         1,
-        "on the robot: how often a peak is judged at most; each further pass cuts a new patch around the center that the "
-        "previous pass found",
+        "on the robot: how often a peak is judged at most; each further pass cuts a new patch around the center "
+        "that the previous pass found",
         "",
         (1, 4),
     )

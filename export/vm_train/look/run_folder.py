@@ -51,9 +51,10 @@ _FILES = (
 class LookRun:
     """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
 
-    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. start_sha256:
-    digest of the checkpoint of the network to begin with, None without one. object_class: class to judge. strict: whether a picture that can't be used ends the training. threads: number of
-    computing threads; a resumed training takes the same.
+    data: folder of the pictures. model: the mesh network as the user named it. mesh: its copy. start_sha256: digest of
+    the checkpoint of the network to begin with, None without one. object_class: class to judge. strict: whether a
+    picture that can't be used ends the training. threads: number of computing threads; a resumed training takes the
+    same.
     """
 
     folder: Path
@@ -121,7 +122,8 @@ def begin_look_run(
     threads: int = 1,
     start: LookCheckpoint | None = None,
 ) -> LookRun:
-    """Write the files of a new training. model: file of the mesh network; name: as the user named it. start: network to begin with, which fits the configuration.
+    """Write the files of a new training. model: file of the mesh network; name: as the user named it. start: network to
+    begin with, which fits the configuration.
 
     Raises InputError, also if the folder holds a training, and ModelError.
     """

@@ -1,8 +1,9 @@
 """The folder of a fine-tuning: what it was begun with, and what it has produced.
 
 tune.toml: the configuration. run.json: where the boxes are. before.onnx: the model file that it began with.
-rendered.npz: rendered patches. patches/: patches of the user's frames. look.pt: the network, when it is trained. state.pt:
-the state to resume from. log.jsonl, tensorboard/: the record of each step. model.onnx: the new model file. pictures.json: the frames of each part. report.html, result.json: what both networks find in the held-out frames.
+rendered.npz: rendered patches. patches/: patches of the user's frames. look.pt: the network, when it is trained.
+state.pt: the state to resume from. log.jsonl, tensorboard/: the record of each step. model.onnx: the new model file.
+pictures.json: the frames of each part. report.html, result.json: what both networks find in the held-out frames.
 """
 
 from __future__ import annotations
