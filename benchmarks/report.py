@@ -117,9 +117,7 @@ def _medians(found: dict[str, Any]) -> dict[str, float]:
     made = {}
     for kind, title in (("session", "session"), ("whole", "whole call")):
         made |= {f"{name}, {title}": found["whole_calls"][name][kind]["p50"] for name in ("5x4", "13x16")}
-    made |= {
-        f"`{name}`": found["shipped"][f"{name}, to 14 m"]["total"]["p50"] for name in ("ball", "soccer")
-    }
+    made |= {f"`{name}`": found["shipped"][f"{name}, to 14 m"]["total"]["p50"] for name in ("ball", "soccer")}
     return made | {
         name: found["peers"]["calls"][name]["p50"] for name in ("SSDLite MobileNet v3, 320", "YOLO nano, 640")
     }

@@ -210,12 +210,11 @@ def card(found: dict[str, Any], name: str) -> str:
     size = " x ".join(map(str, scores["size"]))
     return f"""# {name}
 
-Finds {"balls, goal posts, robots, lines and the border" if name == "soccer" else "balls"} on a soccer field.
-A network on mesh octaves, with {depth} separable convolutions of {width} channels at full resolution, shows cells and
-peaks. The mesh has k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A close look decides about
-the best peaks.
-All suit balls of any radius (`--object-radius`, default {manifest.object_radius:g} m).
-{kilobytes:.0f} kB. Classes: {", ".join(each.name for each in manifest.classes)}.
+Finds {"balls, goal posts, robots, lines and the border" if name == "soccer" else "balls"} on a soccer field. A network
+on mesh octaves, with {depth} separable convolutions of {width} channels at full resolution, shows cells and peaks. The
+mesh has k = {manifest.intersections:g} and reaches to {manifest.max_distance:g} m. A close look decides about the best
+peaks. All suit balls of any radius (`--object-radius`, default {manifest.object_radius:g} m). {kilobytes:.0f} kB.
+Classes: {", ".join(each.name for each in manifest.classes)}.
 
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
   (`export/vm_synth/varied.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch

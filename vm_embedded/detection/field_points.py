@@ -30,7 +30,7 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
         return None
     view, pyramid = observation.view, observation.pyramid
     posts, robots = (
-        find_uprights(observation, name, looks.get(name), settings) if name in observation.peaks else ()
+        find_uprights(observation, name, looks.get(name), settings) if name in observation.manifest.peaks else ()
         for name in ("goal", "robot")
     )
     return find_features(

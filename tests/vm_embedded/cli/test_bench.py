@@ -59,12 +59,12 @@ def test_the_vector_instructions_of_arm_are_known(tmp_path):
 @pytest.mark.long
 def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
     path = tmp_path / "vm.toml"
-    path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nmax_proposals = 9\n')
+    path.write_text('# ours\nmodel = "ball.onnx"\n\n[detector]\nthreads = 7 # too many\nmax_widths = 9\n')
     out = run("--model", MODEL, "--frames", 300, "--up-to", 1, "--size", "320x240", "--tune", path).stdout
     assert f"{path}: threads = 1, spinning = false, pitch_step = " in out
     assert "pitch_step" in out
     settings = read_configuration(path).detector
-    assert (settings.threads, settings.max_proposals) == (1, 9)
+    assert (settings.threads, settings.max_widths) == (1, 9)
     assert settings.pitch_step == settings.roll_step
     assert "# ours" in path.read_text()
     assert "# too many" in path.read_text()
@@ -73,7 +73,7 @@ def test_tuned_settings_are_written_and_read_by_vm_detect(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--model", "ball-smaller"), "did you mean 'ball-small'"),
+        (("--model", "baller"), "did you mean 'ball'"),
         (("--model", "nowhere.onnx"), "nowhere.onnx"),
         (("--model", MODEL, "--size", "640"), "640x512"),
         (("--model", MODEL, "--size", "\u00b2x\u00b2"), "640x512"),
