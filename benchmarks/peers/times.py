@@ -157,7 +157,7 @@ def classifier_call(classifier: PatchClassifier, count: int) -> Callable[[], obj
 
 
 def proposals(frame: Frame, rounds: int) -> dict[str, Any]:
-    """Times of classifiers for one patch, and for each of a batch in one call [ms]; and the stage look of whole calls."""
+    """Times of classifiers for one patch, and each of a batch in one call [ms]; and the stage look of whole calls."""
     networks: dict[str, tuple[Callable[[int], Callable[[], object]], int]] = {}
     for each in CLASSIFIERS:
         count = operations(each.network, (1, each.channels, each.side, each.side))
