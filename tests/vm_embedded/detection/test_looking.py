@@ -24,7 +24,7 @@ from .peaked import answers_of
 from .views import BALL, LENS, SIZE, center_at, picture_of
 
 EXTENT = 1.75
-MANIFEST = ball_manifest("ball", "other", mesh="octaves", sampling="footprint", intersections=3.0, peaks=("ball",))
+MANIFEST = ball_manifest("ball", "other", mesh="octaves", sampling="footprint", peaks=("ball",))
 VIEW = MeshCache(MANIFEST, Settings()).view(Orientation.from_roll_pitch(0.9, 0.05, 0.5), LENS, SIZE)
 BALLS = tuple(center_at(VIEW, each) for each in ((200.0, 380.0), (430.0, 260.0)))
 NOTHING = tuple(center_at(VIEW, each) for each in ((560.0, 400.0), (100.0, 420.0)))
