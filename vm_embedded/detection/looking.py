@@ -16,7 +16,7 @@ from ..arrays import Floats, Image, Singles
 from ..network.look_contract import LookContract
 from .judging import repeated
 from .observation import Observation
-from .peaks import LARGEST_SIZE, probability_of
+from .peaks import LARGEST_SIZE, Peaks, probability_of
 from .places import Places, PlanePlaces, mean_center
 from .prepared_view import PreparedView
 from .settings import Settings
@@ -59,20 +59,20 @@ class Judgment:
 
 def judge_peaks(
     observation: Observation,
-    class_name: str,
+    peaks: Peaks,
     look: Look | None,
     settings: Settings,
     watch: Stopwatch,
     explain: bool = False,
 ) -> list[Judgment]:
-    """The objects of a class that the network has peaks for, most probable first.
+    """The objects at the peaks of a class, most probable first.
 
     look: the look network for the class; it judges the best peaks. Their scores, times its `mesh_weight`, count in the
     probabilities, wherever the look moves them. Without it, the peaks are the objects. explain: also the rejected ones,
     with their reasons. watch: gets the stages propose, and with a look look. Raises ModelError if the look network does
     not run.
     """
-    view, peaks = observation.view, observation.peaks[class_name]
+    view = observation.view
     if look is None:
         centers = view.shape.center_along(peaks.rays, view.height)
         sizes = peaks.log_sizes + math.log(observation.manifest.radius / view.shape.radius)

@@ -48,7 +48,7 @@ def locate(
         if object_class.kind != "object":
             continue
         if name in observation.manifest.peaks:
-            judged = judge_peaks(observation, name, looks.get(name), settings, watch, explain)
+            judged = judge_peaks(observation, observation.peaks[name], looks.get(name), settings, watch, explain)
             found = [_describe_judgment(observation, name, each) for each in judged]
         else:
             candidates = _candidates(observation, name, probabilities, settings)

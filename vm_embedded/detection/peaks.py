@@ -56,6 +56,11 @@ class Peaks:
         """Some of the peaks."""
         return Peaks(self.rays[chosen], self.scores[chosen], self.log_sizes[chosen])
 
+    def apart(self, view: PreparedView) -> Peaks:
+        """The peaks that are not in the object of a better one; view: of objects of their class."""
+        centers = view.shape.center_along(self.rays, view.height)
+        return self.part(first_apart(view.shape.covers(self.rays, centers, view.height)))
+
 
 def first_apart(near: Mask) -> Chosen:
     """Numbers of those of p places, best first, that are not near a better one that counts itself.

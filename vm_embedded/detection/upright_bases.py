@@ -38,7 +38,9 @@ def find_uprights(
     """
     view = observation.view
     radius = observation.manifest.radius if look is None else look.contract.upright_radius
-    judged = judge_peaks(around_bases(observation, radius), class_name, look, settings, Stopwatch())
+    circles = around_bases(observation, radius)
+    peaks = observation.peaks[class_name].apart(circles.view)
+    judged = judge_peaks(circles, peaks, look, settings, Stopwatch())
     centers = np.array([each.center for each in judged]).reshape(-1, 3) @ view.heading.T
     widths = [2.0 * radius * each.scale for each in judged]
     pixels = view.picture_pixels(centers[:, :2])

@@ -51,7 +51,7 @@ class Collector:
     def _collect(self, item: Item) -> PatchChunk:
         settings, seen = self.run.configuration.patches, self.observer.observe(item.files)
         observation, truths, view = seen.observation, seen.truths, seen.observation.view
-        places = proposed_places(observation, self.observer.object_class, settings)
+        places = proposed_places(view, seen.peaks, settings)
         if not item.validates:
             random = random_of(settings.seed, item.files.number)
             places += jittered_places(view, truths, settings, random)

@@ -69,8 +69,7 @@ class Judge:
             seen = self.observer.observe(item.files)
         except (InputError, GeometryError):  # was reported when the patches were collected
             return Found(np.empty(0), np.empty(0, dtype=np.bool_), 0, 0)
-        name = self.observer.object_class
-        judged = judge_peaks(seen.observation, name, self.look, self.settings, Stopwatch())
+        judged = judge_peaks(seen.observation, seen.peaks, self.look, self.settings, Stopwatch())
         kept = sorted((each for each in judged if each.reason is None), key=lambda each: -each.confidence)
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
         found = label_places(Tangents.at(seen.observation.view, centers), seen.truths)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from vm_embedded.detection.observation import Observation
+from vm_embedded.detection.peaks import Peaks
 from vm_embedded.detection.upright_bases import around_bases
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import UPRIGHTS
@@ -44,9 +45,10 @@ def items_of(run: LookRun) -> list[Item]:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """A picture after the mesh network, and the true objects."""
+    """A picture after the mesh network: the peaks of the judged class, and the true objects."""
 
     observation: Observation
+    peaks: Peaks
     truths: Truths
 
 
@@ -80,13 +82,14 @@ class Observer:
         picture = read_picture(files, self.classes)
         scene = read_scene(files.scene)
         observation = self.subject.observe(picture, self._radius(scene))
-        manifest = observation.manifest
+        manifest, peaks = observation.manifest, observation.peaks[self.object_class]
         if self.kind is not None:
             circles = around_bases(observation, self.upright_radius)
             field = read_field(files.scene)
-            return Observed(circles, true_bases(picture, field, self.classes.names, circles.view, self.kind))
+            peaks = peaks.apart(circles.view)
+            return Observed(circles, peaks, true_bases(picture, field, self.classes.names, circles.view, self.kind))
         in_masks = replace(self.in_masks, radius=manifest.radius, object_radius=manifest.object_radius)
-        return Observed(observation, find_truths(picture, scene, in_masks, observation.view, self.object_class))
+        return Observed(observation, peaks, find_truths(picture, scene, in_masks, observation.view, self.object_class))
 
     def _radius(self, scene: SceneTruth | None) -> float | None:
         """Radius of the objects to look for [m]: that of the scene, if the mesh network is for any radius."""

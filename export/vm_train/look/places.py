@@ -10,6 +10,7 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
+from vm_embedded.detection.peaks import Peaks
 from vm_embedded.detection.prepared_view import PreparedView
 
 from .configuration import PatchSettings
@@ -53,10 +54,9 @@ class Places:
         return cut_patches(observation.pyramid, nodes, settings.size)
 
 
-def proposed_places(observation: Observation, class_name: str, settings: PatchSettings) -> Places:
-    """The peaks of a class that a look judges, best first."""
-    view, rays = observation.view, observation.peaks[class_name].rays[: settings.max_proposals]
-    return Places.of(view.shape.center_along(rays, view.height))
+def proposed_places(view: PreparedView, peaks: Peaks, settings: PatchSettings) -> Places:
+    """The peaks that a look judges, best first."""
+    return Places.of(view.shape.center_along(peaks.rays[: settings.max_proposals], view.height))
 
 
 def jittered_places(view: PreparedView, truths: Truths, settings: PatchSettings, random: np.random.Generator) -> Places:

@@ -388,7 +388,7 @@ def test_the_look_judges_peaks_and_the_score_counts_as_often_as_its_contract_say
     ray = VIEW.layout.rays[cell]
     seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score)])
     look = Sure(right, probability, mesh_weight=weight)
-    (judged,) = judge_peaks(seen, "ball", look, SETTINGS, Stopwatch(), explain=True)
+    (judged,) = judge_peaks(seen, seen.peaks["ball"], look, SETTINGS, Stopwatch(), explain=True)
     moved = offset(VIEW, judged.center / np.linalg.norm(judged.center), ray)
     assert moved == pytest.approx(abs(right), abs=0.02)
     expected = log_odds(np.float64(np.float32(probability))) + weight * score

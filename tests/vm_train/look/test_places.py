@@ -53,7 +53,8 @@ def test_random_places_are_in_the_picture_and_on_the_mesh(seed):
 
 
 def test_proposals_are_at_the_balls():
-    found = proposed_places(test_looking.observed(NEAR, FAR), "ball", PatchSettings())
+    observation = test_looking.observed(NEAR, FAR)
+    found = proposed_places(observation.view, observation.peaks["ball"], PatchSettings())
     labels = label_places(found.tangents(test_looking.VIEW), truths(NEAR, FAR))
     assert set(labels.of) >= {0, 1}
 
