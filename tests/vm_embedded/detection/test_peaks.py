@@ -412,7 +412,8 @@ def test_a_look_judges_the_best_peaks():
     rays = VIEW.layout.rays[cells_ahead(1.2, 2.5, 5.0)]
     seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score) for ray, score in zip(rays, (1.0, 3.0, 2.0), strict=True)])
     found, _ = locate(seen, {"ball": Sure(max_proposals=2)}, SETTINGS, Stopwatch())
-    assert sorted(round(each.distance) for each in found) == [3, 5]
+    assert len(found) == 2
+    assert min(each.distance for each in found) > 2.0  # not the nearest, whose score is the lowest
 
 
 def test_without_a_look_the_peaks_are_the_objects():
@@ -422,7 +423,8 @@ def test_without_a_look_the_peaks_are_the_objects():
     rows = [("ball", *each) for each in zip(rays, sizes, scores, strict=True)]
     for larger in (1.0, 1.5):
         balls = replace(BALLS, object_radius=larger * BALLS.radius)
-        found, rejected = locate(observed(VIEW, balls, rows), {}, SETTINGS, Stopwatch(), explain=True)
+        seen = observed(VIEW._replace(shape=balls.object_shape), balls, rows)
+        found, rejected = locate(seen, {}, SETTINGS, Stopwatch(), explain=True)
         assert [each.confidence for each in found] == pytest.approx([0.9526, 0.7311], abs=1e-3)
         for each, ray, size in zip(found, rays[[1, 0]], (0.1, 0.0), strict=True):
             assert offset(VIEW, VIEW.heading.T @ each.bearing, ray) < 0.01

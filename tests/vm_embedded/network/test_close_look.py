@@ -166,7 +166,7 @@ def test_an_unknown_entry_is_refused():
 
 @pytest.mark.parametrize("look", [[], 1, "look", True, {}])
 def test_a_look_that_is_no_table_is_refused(look):
-    data = json.loads(MANIFEST.as_json()) | {"look": look}
+    data = json.loads(MANIFEST.as_json()) | {"looks": [look]}
     with pytest.raises(ModelError, match="must have the entries"):
         Manifest.from_json(json.dumps(data))
 
