@@ -72,20 +72,6 @@ def test_a_bucket_never_changes_an_answer(index, pitch, roll, steps):
     assert detector.cache.hits == 1
 
 
-@pytest.mark.parametrize("index", range(len(IMAGES)))
-def test_both_layouts_find_the_same(models, index):
-    one, other = (Detector.from_file(path).detect(*frame(index), explain=True) for path in models.values())
-    np.testing.assert_array_equal(one.rays, other.rays)
-    np.testing.assert_array_equal(one.pixels, other.pixels)
-    np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-4)
-    assert len(one) == len(other) >= 1
-    for ours, theirs in zip(one, other, strict=True):
-        assert ours.class_name == theirs.class_name
-        assert ours.confidence == pytest.approx(theirs.confidence, abs=1e-4)
-        np.testing.assert_allclose(ours.position, theirs.position, atol=1e-6)
-    assert [each.reason for each in one.rejected] == [each.reason for each in other.rejected]
-
-
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
 def test_a_camera_that_looks_at_the_sky_sees_nothing_and_says_so(tolerance):
     image, orientation, lens = frame()
