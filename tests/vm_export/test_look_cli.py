@@ -72,7 +72,7 @@ def test_command_attaches_a_look_to_a_model_file_and_removes_it(folder):
         (("model.pt", "--look", "look.pt", "--to-yaml"), "--look is for ONNX files"),
         (("model.pt", "--look", "look.pt", "-o", "look.pt"), "would be overwritten"),
         (("model.pt", "--no-look"), "--no-look is for model files (.onnx)"),
-        (("model.pt", "--look", "look.pt", "--classes", "goal:object,other:background"), "in the manifest's peaks 'ball'"),
+        (("model.pt", "--look", "look.pt", "--classes", "goal:object,other:background"), "peaks 'ball'"),
         (("given.onnx",), "is a model file already"),
         (("damaged.onnx",), "damaged.onnx: not an ONNX file"),
         (("given.onnx", "--look", "look.pt"), "would be overwritten"),
