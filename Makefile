@@ -148,11 +148,11 @@ peers: need-HDRI .venv/bench ## train other detectors, and compare their speed a
 fixtures: .venv/dev ## draw the frames of the tests and train their network again (about 20 minutes)
 	$(BIN)/python -m tests.fixtures.make_drawn
 
-docs: .venv/dev demo ## write the generated pages of docs/ and the demo's picture again
+docs: .venv/dev demo ## write the schema of the messages and the demo's picture again
 	$(BIN)/python docs/help_pages.py
 	$(BIN)/python docs/demo_picture.py
 
-site: .venv/docs ## build docs/ as a web site in build/site
+site: .venv/docs ## build docs/ as a web site in build/site, with pages of all options and of the Python API
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --config-file docs/site/mkdocs.yml
 	@echo "Open $(CURDIR)/build/site/index.html, or with search: $(BIN)/python -m http.server --directory build/site"
 

@@ -2,7 +2,8 @@
 
 It trains small networks on the same pictures, each with one change, some with several seeds, one training per core, and
 scores them on pictures under maps that no training uses. It skips finished trainings. It writes
-benchmarks/choices.json, from which benchmarks/choices_report.py makes the tables and plots of docs/experiments.md.
+benchmarks/choices.json, from which benchmarks/choices_report.py makes the tables and the plot of
+experiments/mesh-network.md.
 """
 
 from __future__ import annotations

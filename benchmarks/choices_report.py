@@ -1,4 +1,4 @@
-"""Tables and plots of docs/experiments.md from benchmarks/choices.json: `python -m benchmarks.choices_report`."""
+"""Tables and plot of experiments/mesh-network.md from choices.json: `python -m benchmarks.choices_report`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.choices import HEIGHTS, LENSES, RESULTS
-from benchmarks.report import DOCS, EXPERIMENTS, fill, spread, table
+from benchmarks.report import EXPERIMENTS, fill, spread, table
 from vm_workstation.plots import new_figure, save_figure
 
 GROUPS = {
@@ -116,14 +116,14 @@ def plot(results: dict[str, Any]) -> None:
         axes.spines[["top", "right"]].set_visible(False)
     handles, labels = curves.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=6, fontsize=9, frameon=False)
-    save_figure(figure, DOCS / "choices.svg")
+    save_figure(figure, EXPERIMENTS / "choices.svg")
 
 
 def main() -> None:
     results = json.loads(RESULTS.read_text())
     made = {name: group(results, name) for name in GROUPS}
     made |= {"lenses": transfer(results, LENSES), "heights": transfer(results, HEIGHTS)}
-    fill(EXPERIMENTS, made)
+    fill(EXPERIMENTS / "mesh-network.md", made)
     plot(results)
 
 

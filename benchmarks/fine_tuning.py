@@ -4,7 +4,8 @@
 
 It fine-tunes a network on 25, 50, 100 and all frames, drawn with each of three seeds, and writes the recall of the test
 frames' boxes before and after: at the threshold that lets 1 in 2000 other places pass. `work` keeps the trainings, so
-that the program can be interrupted and started again. Results: benchmarks/fine_tuning.json and docs/fine-tuning.svg.
+that the program can be interrupted and started again. Results: benchmarks/fine_tuning.json and
+benchmarks/experiments/fine-tuning.svg.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS), help="seeds of drawing and training")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the trainings")
     parser.add_argument("--json", type=Path, default=Path("benchmarks/fine_tuning.json"), help="results")
-    parser.add_argument("--plot", type=Path, default=Path("docs/fine-tuning.svg"), help="plot of the results")
+    parser.add_argument("--plot", type=Path, default=Path("benchmarks/experiments/fine-tuning.svg"), help="their plot")
     options = parser.parse_args()
     names = parse_names(options.names)
     training, test = (read_boxes(folder, names=names).pictures for folder in (options.training, options.test))

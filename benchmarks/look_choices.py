@@ -3,7 +3,7 @@
 It trains looks for the mesh network `ball` on the same pictures, each with one change and three seeds, one training per
 core, and scores each on pictures under maps that no training uses. It skips finished trainings, and trainings with the
 same patches share them. It writes benchmarks/look_choices.json, from which benchmarks/look_choices_report.py makes the
-tables and the plot of docs/experiments.md.
+tables and the plot of experiments/close-look.md.
 """
 
 from __future__ import annotations

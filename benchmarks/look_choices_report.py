@@ -1,4 +1,4 @@
-"""The table and plot of docs/experiments.md on close looks: `python -m benchmarks.look_choices_report`."""
+"""The table and plot of experiments/close-look.md: `python -m benchmarks.look_choices_report`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.look_choices import RESULTS
-from benchmarks.report import DOCS, EXPERIMENTS, fill, spread, table
+from benchmarks.report import EXPERIMENTS, fill, spread, table
 from vm_workstation.plots import new_figure, save_figure
 
 NEAR, FAR = "0.5 to 6 m", "6 to 10 m"
@@ -52,12 +52,12 @@ def plot(found: dict[str, Any]) -> None:
     axes.set_ylabel("AP50, 0.5 to 6 m (line: lowest and highest seed)")
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
-    save_figure(figure, DOCS / "look-choices.svg")
+    save_figure(figure, EXPERIMENTS / "look-choices.svg")
 
 
 def main() -> None:
     found = json.loads(RESULTS.read_text())
-    fill(EXPERIMENTS, {"look choices": choices(found)})
+    fill(EXPERIMENTS / "close-look.md", {"look choices": choices(found)})
     plot(found)
 
 

@@ -18,7 +18,7 @@ OTHER_MACHINE = Path(__file__).with_name("results_xeon.json")
 PEER_TIMES = Path(__file__).with_name("peer_times.json")
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "performance.md"
-EXPERIMENTS = DOCS / "experiments.md"
+EXPERIMENTS = Path(__file__).with_name("experiments")
 README = DOCS.parent / "README.md"
 
 

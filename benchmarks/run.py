@@ -224,7 +224,7 @@ def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
         for height in (0.5, 0.8, 1.1):
             cache, largest = MeshCache(detector.manifest, detector.settings), 0.0
             middle = Orientation.from_roll_pitch(height, 0.0, 0.35)
-            for number, orientation in enumerate(walk(middle, np.deg2rad(10.0), 0.03, int(30 * seconds))):
+            for number, orientation in enumerate(walk(middle, int(30 * seconds))):
                 if number == 30:
                     cache.hits = cache.misses = 0
                 cache.view(orientation, lens, frame.size)

@@ -51,6 +51,7 @@ def _release(top: Path, version: str, url: str | None) -> None:
         raise InputError("the checkout has changes: commit or undo them first")
     if _git(top, "tag", "--list", tag):
         raise InputError(f"the tag {tag} exists; choose another version")
+    _git(top, "var", "GIT_COMMITTER_IDENT")  # fails before any file changes
     changes = {CHANGELOG: dated, VERSION_FILE: with_version, ROS_PACKAGE: with_ros_version, USE: with_wheel_version}
     for name, change in changes.items():
         path = top / name

@@ -1,8 +1,4 @@
-"""The text of docs/api.md, the reference of vm_embedded's public names, from their signatures and docstrings.
-
-`python docs/help_pages.py` writes it; a test checks that it is current. It is plain Markdown, so that it also reads
-well on a code host.
-"""
+"""The API reference of the web site: vm_embedded's public names, from their signatures and docstrings."""
 
 from __future__ import annotations
 
@@ -57,7 +53,7 @@ _NAMES = {name for names in GROUPS.values() for name in names}
 
 HEAD = """# API reference
 
-Every public name of `vm_embedded`, made from its docstring by `make docs`. Examples are on the page
+Every public name of `vm_embedded`, made from its docstring by `make site`. Examples are on the page
 [Use](use.md#from-python). Arrays are numpy arrays: shapes are in parentheses, units in brackets.
 """
 
@@ -163,9 +159,16 @@ def _field_table(value: type, meanings: dict[str, str]) -> str:
         meaning += "; {:g} to {:g}".format(*data["limits"]) if data.get("limits") else ""
         default = "" if each.default is dataclasses.MISSING else f"`{each.default!r}`"
         default = default if each.default_factory is dataclasses.MISSING else f"`{each.default_factory()!r}`"
-        cells = (f"`{each.name}`", f"`{each.type}`", default, *([meaning] if explained else []))
+        cells = (f"`{each.name}`", f"`{_type(each.type)}`", default, *([meaning] if explained else []))
         rows.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(rows)
+
+
+def _type(annotation: str) -> str:
+    """A type as the source has it, without the rest of an Annotated."""
+    node = ast.parse(annotation, mode="eval").body
+    is_annotated = isinstance(node, ast.Subscript) and ast.unparse(node.value) == "Annotated"
+    return ast.unparse(node.slice.elts[0]) if is_annotated else annotation
 
 
 def _fields(value: type) -> list[dataclasses.Field[Any]]:
@@ -195,7 +198,7 @@ def _member(owner: str, value: type, name: str) -> str:
         getattr(each, "fget", None) or getattr(each, "func", None) or getattr(each, "__func__", each) for each in found
     ]
     text = _markdown(next((each.__doc__ for each in functions if each.__doc__), None), _parameters(functions[0]))
-    kind = str(inspect.signature(functions[0]).return_annotation)
+    kind = _type(str(inspect.signature(functions[0]).return_annotation))
     if isinstance(found[0], (property, cached_property)):
         return f"**`{name}: {kind}`**\n\n{text}"
     if name in _SPECIAL:

@@ -1,11 +1,10 @@
-"""Writes the pages that are made from the programs, so that both stay the same:
+"""The texts that are made from the programs, so that both stay the same.
 
-- docs/command-line.md from the parsers and from the usage texts of the robot's scripts,
-- docs/vm.toml, scene.toml, train.toml and look.toml from the entries of configurations,
-- docs/messages.schema.json, the JSON Schema of the messages,
-- docs/api.md from the docstrings (api_page.py).
-
-`python docs/help_pages.py` writes them; a test checks that they are current.
+site_pages are pages of the web site only (site/outside_pages.py adds them): the command line, from the parsers and from
+the usage texts of the robot's scripts, and the API reference, from the docstrings (api_page.py). pages are files of the
+repository that describe messages (message_pages.py): messages.schema.json, and the parts of use.md, daemon.md and
+deploy/cpp/vm_detect.hpp between markers. `python docs/help_pages.py` writes them, and a test checks that they are
+current.
 """
 
 from __future__ import annotations
@@ -16,25 +15,20 @@ import re
 from pathlib import Path
 
 import api_page
+import message_pages
 
 from vm_calibrate import cli as calibrate
 from vm_embedded.cli import bench, detect, doctor
-from vm_embedded.cli.program import PrintCompletion
-from vm_embedded.config.toml_writer import to_commented_toml
-from vm_embedded.live import configuration as detection
-from vm_embedded.output.message_schema import message_schema
+from vm_embedded.cli.program import PrintAllHelp, PrintCompletion
 from vm_export import cli as export
 from vm_label import cli as label
 from vm_mesh import cli as mesh
 from vm_ros import cli as ros
 from vm_synth import cli as synth
-from vm_synth.scene import configuration as scene
 from vm_train.cli import evaluate
 from vm_train.cli import options as train
-from vm_train.learning import configuration as training
-from vm_train.look import configuration as look
 
-_ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintCompletion)
+_ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintAllHelp, PrintCompletion)
 """Options that all programs have."""
 
 DOCS = Path(__file__).parent
@@ -44,14 +38,14 @@ SCRIPTS = DOCS.parent / "deploy" / "robot"
 def pages() -> dict[Path, str]:
     """All files that this script writes, with their texts."""
     return {
-        DOCS / "command-line.md": command_line(),
-        DOCS / "api.md": api_page.page(),
-        DOCS / "messages.schema.json": json.dumps(message_schema(), indent=1) + "\n",
-        DOCS / "vm.toml": to_commented_toml(detection.Configuration(), detection.HEADER),
-        DOCS / "scene.toml": to_commented_toml(scene.SceneConfiguration(), scene.HEADER),
-        DOCS / "train.toml": to_commented_toml(training.TrainConfiguration(), training.HEADER),
-        DOCS / "look.toml": to_commented_toml(look.LookConfiguration(), look.LOOK_HEADER),
+        DOCS / "messages.schema.json": json.dumps(message_pages.schema(), indent=1) + "\n",
+        **message_pages.pages(DOCS.parent),
     }
+
+
+def site_pages() -> dict[str, str]:
+    """The pages of the web site that are no files of the repository: their names and texts."""
+    return {"command-line.md": command_line(), "api.md": api_page.page()}
 
 
 def parsers() -> dict[str, argparse.ArgumentParser]:
@@ -65,7 +59,8 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
 def command_line() -> str:
     """The page of the command line."""
     made = (
-        "Made from the help texts of the programs by `make docs`. `--help` prints the same, `--version` the version, "
+        "Made from the help texts of the programs by `make site`. `--help` prints the usual options, `--help-all` all, "
+        "`--version` the version, "
         "and `--completion` the script that completes options in bash."
     )
     parts = [f"# Command line\n\n{made}\n"]

@@ -24,9 +24,7 @@ def kind_of(message):
     """The kind of a message, as the schema names it."""
     if "type" in message:
         return "status" if "counts" in message else message["type"]
-    if "source" in message:
-        return "file_frame"
-    return "ros" if "points" in message else "ros_state"
+    return "file_frame"
 
 
 def checked(message):

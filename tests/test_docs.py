@@ -2,13 +2,16 @@
 
 import ast
 import importlib
+import importlib.util
 import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -26,13 +29,16 @@ OUTSIDE = [
     TOP / ".github" / "CONTRIBUTING.md",
 ]
 PAGES = [*OUTSIDE, *sorted(DOCS.glob("*.md"))]
+EXPERIMENTS = sorted((TOP / "benchmarks" / "experiments").glob("*.md"))
+OPTIONAL = ("pandas", "supervision")
+"""Packages that programs of the pages may use and that users install themselves."""
 
 
 def name_of(page: Path) -> str:
     return str(page.relative_to(TOP))
 
 
-every_page = pytest.mark.parametrize("page", PAGES, ids=name_of)
+every_page = pytest.mark.parametrize("page", [*PAGES, *EXPERIMENTS], ids=name_of)
 
 
 @pytest.fixture
@@ -40,7 +46,7 @@ def docs_script(monkeypatch):
     """Imports a script of docs/ by its name."""
     monkeypatch.syspath_prepend(str(DOCS))
     yield __import__
-    for name in ("help_pages", "api_page"):
+    for name in ("help_pages", "api_page", "message_pages"):
         sys.modules.pop(name, None)
 
 
@@ -53,7 +59,14 @@ def test_the_api_page_has_every_public_name(docs_script):
     api_page = docs_script("api_page")
     grouped = [name for names in api_page.GROUPS.values() for name in names]
     assert sorted(grouped) == sorted([*vm_embedded.__all__, *api_page.OTHERS])
-    assert all(f"\n### {name}\n" in (DOCS / "api.md").read_text() for name in grouped)
+    page = api_page.page()
+    assert all(f"\n### {name}\n" in page for name in grouped)
+
+
+def test_the_command_line_page_has_every_program(docs_script):
+    help_pages = docs_script("help_pages")
+    page = help_pages.command_line()
+    assert all(f"\n## {name}\n" in page for name in help_pages.parsers())
 
 
 def test_tables_of_the_readme_are_the_published_figures():
@@ -75,34 +88,65 @@ def test_the_readme_is_short():
     assert len(README.read_text().splitlines()) <= 150
 
 
-def programs(page: Path) -> list[str]:
-    """The Python of a page."""
-    return re.findall(r"^```python\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
+
+
+def programs(page: Path, without: Iterable[str]) -> list[str]:
+    """The Python of a page, except what needs one of these packages."""
+    return [each for each in blocks(page, "python") if not any(f"import {name}\n" in each for name in without)]
 
 
 @pytest.mark.parametrize(
     ("page", "printed"),
-    [(README, "ball 0."), (DOCS / "use.md", "detections, "), (DOCS / "meshes.md", "ball head ground [")],
-    ids=["README", "use", "meshes"],
+    [
+        (README, "ball 0."),
+        (DOCS / "use.md", "detections, "),
+        (DOCS / "meshes.md", "ball head ground ["),
+        (DOCS / "recipes.md", "track 1 ["),
+    ],
+    ids=["README", "use", "meshes", "recipes"],
 )
 def test_the_python_of_a_page_works_as_pasted(page, printed, tmp_path, monkeypatch, capsys):
     """In the folder of the checkout, one program after the other, as in one interpreter."""
     (tmp_path / "tests").symlink_to(TOP / "tests")  # so that files that a program writes land elsewhere
     monkeypatch.chdir(tmp_path)
     names = {}
-    for program in programs(page):
+    for program in programs(page, without=[each for each in OPTIONAL if importlib.util.find_spec(each) is None]):
         exec(program, names)
     assert printed in capsys.readouterr().out
 
 
 def test_the_python_of_the_pages_has_right_types(tmp_path):
     """A user's strict type checker accepts it: images as OpenCV's stubs declare them, py.typed, all annotations."""
-    for page in (README, DOCS / "use.md", DOCS / "meshes.md"):
-        (tmp_path / f"{page.stem}.py").write_text("".join(programs(page)))
+    for page in (README, DOCS / "use.md", DOCS / "meshes.md", DOCS / "recipes.md"):
+        (tmp_path / f"{page.stem}.py").write_text("".join(programs(page, without=OPTIONAL)))
     command = [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", "--config-file", "", "."]
     environment = {**os.environ, "MYPYPATH": str(TOP)}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
+
+
+def test_another_language_reads_the_lines_of_json(tmp_path):
+    """The program for Node.js of the recipes, behind vm-detect."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("needs Node.js")
+    page = DOCS / "recipes.md"
+    (tmp_path / "balls.js").write_text("".join(blocks(page, "js")))
+    detect, read = shell_lines(page)[0].split(" | ")
+    command = [sys.executable, "-m", "vm_embedded.cli.detect", *shlex.split(detect)[1:]]
+    lines = subprocess.run(command, cwd=TOP, capture_output=True, check=True).stdout
+    reader = [node, *shlex.split(read)[1:]]
+    done = subprocess.run(reader, cwd=tmp_path, input=lines, capture_output=True, check=True)
+    expected = [
+        rf"{frame['source']}: {ball['class']} .* m ahead, .* m to the left"
+        for frame in map(json.loads, lines.splitlines())
+        for ball in frame["detections"]
+    ]
+    printed = done.stdout.decode().splitlines()
+    assert len(printed) == len(expected) > 5
+    assert all(re.fullmatch(pattern, line) for pattern, line in zip(expected, printed, strict=True))
 
 
 def test_the_training_of_the_readme_uses_the_radii_of_its_pictures():
@@ -161,7 +205,7 @@ def test_commands_are_what_the_programs_take(page, docs_script, capsys):
         program = Path(words[0]).name if words else ""
         if program not in programs:
             continue
-        words = words[1 : words.index(">") if ">" in words else None]
+        words = words[1 : next((place for place, word in enumerate(words) if word in (">", "|")), None)]
         command = f"{program} {words[0]}" if words else ""
         parser = parsers[command] if command in parsers else parsers[program]
         try:
@@ -172,9 +216,7 @@ def test_commands_are_what_the_programs_take(page, docs_script, capsys):
 
 @every_page
 def test_imports_of_python_examples_resolve(page):
-    for block in re.findall(r"^```python\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL):
-        if page.name == "api.md" and re.match(r"class |\w+\(|GROUND", block):
-            continue  # signatures
+    for block in blocks(page, "python"):
         for node in ast.walk(ast.parse(block)):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("vm_"):
                 module = importlib.import_module(node.module)
@@ -206,13 +248,14 @@ def test_targets_of_make_exist(page):
 
 def test_the_site_builds_without_warnings_and_needs_no_network(tmp_path):
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", DOCS / "site" / "mkdocs.yml"]
-    environment = {"NO_MKDOCS_2_WARNING": "1", "PATH": ""}
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "PATH": ""}
     done = subprocess.run([*command, "--site-dir", tmp_path], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
     assert "INFO    -  The following pages" not in done.stderr
     pages = list(tmp_path.rglob("*.html"))
     assert len(pages) > len(PAGES)
+    assert {"command-line.html", "api.html"} <= {page.name for page in pages}
     loaded = re.compile(r"<(?:script|img|iframe)[^>]* src=\"?(?:https?:)?//|<link[^>]* href=\"?(?:https?:)?//")
     for page in pages:
         assert not loaded.search(page.read_text()), f"{page.name} loads something from a network"

@@ -22,7 +22,6 @@ COMMANDS = """\
 vm-detect bag --save-mcap bag/bag.mcap
 vm-detect bag/bag.mcap --save-mcap link.mcap
 vm-bench --image frames/image0.jpg --json frames/image0.jpg
-vm-bench --config vm.toml --lens lens.toml --tune lens.toml
 vm-export model.onnx --no-look -o model.onnx
 vm-export model.onnx --no-look
 vm-calibrate kalibr kalibr.yaml --camera cam0 -o kalibr.yaml
@@ -45,7 +44,6 @@ vm-train check boxes --boxes --sheet boxes/a.jpg
 vm-train check frames --boxes --json data.yaml
 vm-train preview data -o data/image0000.jpg
 vm-train rate data --plot data/mask0000.png
-vm-train shards data data
 vm-evaluate ball data --list report/field.csv -o report
 vm-evaluate calibrate model.onnx data -o model.onnx
 """.splitlines()

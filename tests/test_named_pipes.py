@@ -13,8 +13,6 @@ from tests.vm_train.data.test_pictures import write_pictures
 from vm_embedded.network.bundled import model_path
 from vm_label.answers import AnswerFile
 from vm_label.box_folder import read_box_folder
-from vm_train.data.pictures import find_pictures
-from vm_train.formats.shards import write_shards
 
 BALL = ("ball", 20.0, 30.0, 40.0, 50.0)
 
@@ -24,13 +22,12 @@ pictures/mask0000001.png    vm-train check pictures
 pictures/lens0000001.yaml   vm-train check pictures
 pictures/mask0000001.png    vm-train preview pictures -o out.png
 pictures/image0000001.jpg   vm-train pictures --strict -o run
-pictures/mask0000001.png    vm-train shards pictures out
 pictures/mask0000001.png    vm-evaluate ball pictures --strict -o out
 pictures/scene0000001.json  vm-evaluate ball pictures --strict -o out
 list.txt                    vm-evaluate ball pictures --list list.txt -o out
 train.toml                  vm-train pictures --config train.toml -o run
 run/run.json                vm-train resume run
-shards/pictures-000000.tar  vm-train check shards
+a.tar                       vm-train import a.tar out
 a.tfrecord                  vm-train import a.tfrecord out
 yolo/a.jpg                  vm-train check yolo --boxes
 yolo/a.txt                  vm-train check yolo --boxes
@@ -77,7 +74,6 @@ def folder(tmp_path_factory):
     for name in ("pictures", "frames", "run", "set", "bag"):
         (made / name).mkdir()
     write_pictures(made / "pictures")
-    write_shards(find_pictures(made / "pictures"), made / "shards", 2, lambda: None)
     for write, name in ((write_yolo, "yolo"), (write_voc, "voc"), (write_coco, "coco")):
         write(made / name, {"a": [BALL], "b": [BALL]})
     make_folder(made / "labels", 2)

@@ -1,4 +1,4 @@
-"""The page docs/paper.md: rows lead to code, and every label of the paper has a row."""
+"""The page docs/paper.md: its lines lead to code, and every label of the paper has a line."""
 
 import ast
 import os
@@ -21,25 +21,31 @@ FIGURES = {
 LABELS = EQUATIONS | FIGURES | {"tab:visualmesh_performance"}
 
 CODE = re.compile(r"\[`([\w./]+)`\]\(\.\./([\w./]+)\): ((?:`[\w.]+`(?:, )?)+)")
-LINK = r"\[[^\]]+\]\([\w./]*#[\w-]+\)"
-ELSEWHERE = re.compile(rf"not here: [^`]+\.|(?:measured|see): {LINK}(?:, {LINK})*|see the next (?:two|three) rows")
-"""Parts of the last column without code. test_docs.py follows the links."""
+LINK = r"\[[^\]]+\]\([\w./]+(?:#[\w-]+)?\)"
+ELSEWHERE = re.compile(rf"not here: [^`]+\.|{LINK}|see the next (?:two|three) lines")
+"""What a line names instead of code. test_docs.py follows the links."""
 
 
-def rows():
-    """(label or section of the paper, claim, code) of each row."""
-    cells = [line.strip("| ").split(" | ") for line in PAGE.read_text().splitlines() if line.startswith("| ")]
-    assert all(len(row) == 3 for row in cells)
-    return [tuple(row) for row in cells if row[0] not in ("in the paper", "---")]
+def lines():
+    """(label or section of the paper, claim, code) of each item of the page."""
+    found, section = [], ""
+    for line in re.sub(r"\n  (?=\S)", " ", PAGE.read_text()).splitlines():
+        if line.startswith("## "):
+            section = line.removeprefix("## ")
+        elif line.startswith("- "):
+            claim, code = line.removeprefix("- ").split(" → ")
+            label = re.match(r"`(?:eqn|fig|tab):\w+`", claim)
+            found.append((label[0] if label else section, claim[label.end() :] if label else claim, code))
+    return found
 
 
-ROWS = rows()
+LINES = lines()
 
 
-def code_of(cell):
-    """(file, name) of all code in the last column of a row."""
+def code_of(text):
+    """(file, name) of all code behind the arrow of a line."""
     found = []
-    for part in cell.split("<br>"):
+    for part in text.split("; "):
         match = CODE.fullmatch(part)
         assert match or ELSEWHERE.fullmatch(part), part
         if match:
@@ -74,9 +80,9 @@ def _names_of(node):
     return {each.id for each in targets if isinstance(each, ast.Name)}
 
 
-@pytest.mark.parametrize(("label", "cell"), [(label, cell) for label, _, cell in ROWS])
-def test_every_row_leads_to_its_code(label, cell):
-    code = code_of(cell)
+@pytest.mark.parametrize(("label", "code"), [(label, code) for label, _, code in LINES])
+def test_every_line_leads_to_its_code(label, code):
+    code = code_of(code)
     assert code or label.strip("`") not in EQUATIONS
     for file, name in code:
         assert (TOP / file).is_file(), f"{label}: {file} is missing"
@@ -86,18 +92,18 @@ def test_every_row_leads_to_its_code(label, cell):
             assert re.search(rf"{label.strip('`')}\b", texts[0]), f"{name} in {file} does not name {label}"
 
 
-@pytest.mark.parametrize(("title", "cell"), [(label, cell) for label, _, cell in ROWS if not label.startswith("`")])
-def test_a_named_file_says_the_section_that_it_comes_from(title, cell):
-    files = {file for file, _ in code_of(cell)}
+@pytest.mark.parametrize(("title", "code"), [(label, code) for label, _, code in LINES if not label.startswith("`")])
+def test_a_named_file_says_the_section_that_it_comes_from(title, code):
+    files = {file for file, _ in code_of(code)}
     texts = [re.sub(r"\n *(?:# )?", " ", (TOP / file).read_text()) for file in files]
     assert not texts or any(f'"{title}"' in text for text in texts), f'none of {sorted(files)} has "{title}"'
 
 
-@pytest.mark.parametrize(("claim", "cell"), [(claim, cell) for _, claim, cell in ROWS if "`" in claim])
-def test_claims_name_only_what_their_code_has(claim, cell):
-    texts = "".join((TOP / file).read_text() for file, _ in code_of(cell)) + (TOP / "docs" / "meshes.md").read_text()
+@pytest.mark.parametrize(("claim", "code"), [(claim, code) for _, claim, code in LINES if "`" in claim])
+def test_claims_name_only_what_their_code_has(claim, code):
+    texts = "".join((TOP / file).read_text() for file, _ in code_of(code)) + (TOP / "docs" / "meshes.md").read_text()
     for name in re.findall(r"`([^`]+)`", claim):
-        assert name in texts, f"{claim}: no {name} in {cell}"
+        assert name in texts, f"{claim}: no {name} in {code}"
 
 
 def test_the_text_of_a_definition_ends_with_it():
@@ -108,10 +114,10 @@ def test_the_text_of_a_definition_ends_with_it():
     assert "0.75" in definitions("export/vm_train/scores/object_scores.py")["OVERLAPS"][0]
 
 
-def test_every_label_of_the_paper_has_a_row():
-    named = {label.strip("`") for label, _, _ in ROWS if label.startswith("`")}
+def test_every_label_of_the_paper_has_a_line():
+    named = {label.strip("`") for label, _, _ in LINES if label.startswith("`")}
     assert named == LABELS
-    assert len(ROWS) > 80
+    assert len(LINES) > 60
 
 
 def test_labels_and_sections_are_the_papers():
@@ -120,7 +126,7 @@ def test_labels_and_sections_are_the_papers():
     text = PAPER.read_text()
     assert {label for label in re.findall(r"\\label\{([^}]*)\}", text) if not label.startswith("sec:")} == LABELS
     sections = {*re.findall(r"section\{([^}]*)\}", text), "Abstract"}
-    named = {label for label, _, _ in ROWS if not label.startswith("`")}
+    named = {label for label, _, _ in LINES if not label.startswith("`")}
     assert named <= sections, f"no sections of the paper: {sorted(named - sections)}"
 
 

@@ -22,6 +22,8 @@ OTHERS = (
     "yaml",
     "matplotlib",
     "tensorboard",
+    "google",
+    "google_crc32c",
     "scipy",
     "mitsuba",
     "drjit",
@@ -32,6 +34,7 @@ OTHERS = (
 
 CALLS = [
     ("vm_train.cli.train", "torch", ["data", "-o", "run"]),
+    ("vm_train.cli.train", "google", ["import", "a.tfrecord", "out"]),
     ("vm_train.cli.evaluate", "matplotlib", ["points", "-o", "points.svg"]),
     ("vm_export.cli", "torch", ["model.pt"]),
     ("vm_synth.cli", "mitsuba", ["out", "--count", "1", "--hdri", "."]),

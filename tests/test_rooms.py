@@ -37,7 +37,7 @@ OUTSIDE = {
     "vm_synth": {"numpy", "cv2", "mitsuba", "drjit", "matplotlib", "typing_extensions"},
     "vm_mesh": {"numpy", "matplotlib"},
     "vm_label": {"numpy", "cv2"},
-    "vm_train": {"numpy", "cv2", "torch", "matplotlib"},
+    "vm_train": {"numpy", "cv2", "torch", "matplotlib", "google", "google_crc32c"},
     "vm_calibrate": {"numpy", "cv2", "scipy"},
     "vm_ros": {"numpy", "cv2", "rclpy", "cyclonedds"},
 }

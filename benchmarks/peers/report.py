@@ -1,4 +1,6 @@
-"""From the results of the peers to the tables and plots of docs/results.md: `python -m benchmarks.peers.report`.
+"""From the results of the peers to the tables and plots of experiments/other-detectors.md.
+
+Run it with `python -m benchmarks.peers.report`.
 
 It reads peer_times.json, peer_training.json and peer_scores.json of this folder's parent.
 """
@@ -13,13 +15,13 @@ from typing import Any
 
 from vm_workstation.plots import new_figure, save_figure
 
-from ..report import DOCS, fill, machine, ms, number, table
+from ..report import DOCS, EXPERIMENTS, fill, machine, ms, number, table
 from . import score, train
 from .boxes import LENSES
 from .detector import TRAINED
 from .times import RESULTS, TWO_STAGE
 
-PAGE = DOCS / "results.md"
+PAGE = EXPERIMENTS / "other-detectors.md"
 
 PAPER = {
     "Visual Mesh 5": 1.64,
@@ -214,7 +216,7 @@ def main() -> None:
     fill(PAGE, tables())
     scores = json.loads(score.RESULTS.read_text())
     plot_accuracy(scores, DOCS / "peers-accuracy.svg")
-    plot_times(scores, json.loads(RESULTS.read_text())["calls"], DOCS / "peers-time.svg")
+    plot_times(scores, json.loads(RESULTS.read_text())["calls"], EXPERIMENTS / "peers-time.svg")
 
 
 if __name__ == "__main__":

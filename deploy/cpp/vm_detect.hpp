@@ -10,6 +10,7 @@
 //         }
 //     }
 //
+// docs/help_pages.py makes the parts between a line `messages` and a line `end`.
 // It needs C++17 and Linux, no library. Units: meters, seconds, radians, pixels. Frames: as in docs/use.md.
 // vm-detect must send the binary form: [output] unix = "/run/vm-detect/lines.sock", unix_format = "binary".
 #ifndef VM_DETECT_HPP
@@ -30,6 +31,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -40,99 +42,182 @@
 namespace vm_detect {
 
 // The state of vm-detect, as docs/daemon.md lists them. unreachable: there is no connection, or it is silent.
+// messages: states
 enum class State : std::uint8_t { starting, ok, degraded, camera_lost, pose_stale, stopping, unreachable };
 
 inline const char* name(State state) {
-    static constexpr std::array<const char*, 7> names{"starting",   "ok",       "degraded",   "camera_lost",
-                                                      "pose_stale", "stopping", "unreachable"};
+    static constexpr std::array<const char*, 7> names{
+        "starting", "ok", "degraded", "camera_lost", "pose_stale", "stopping", "unreachable"};
     return names[static_cast<std::size_t>(state)];
 }
+// end
 
 using Pair = std::array<float, 2>;
 using Triple = std::array<float, 3>;
 
-// One object over several frames; only with [track] on = true. The errors are standard deviations.
+// messages: structures
+// Time of each stage and of the whole call [ms]; NaN for a stage that was not needed.
+struct Times {
+    float mesh = 0.0F, project = 0.0F, sample = 0.0F, infer = 0.0F, propose = 0.0F, look = 0.0F, cluster =
+        0.0F, field = 0.0F, track = 0.0F, total = 0.0F;
+};
+
+// One object over several frames, at the time of its last detection. The frame is that of Detection.
 struct Track {
-    std::uint32_t id = 0;
-    Triple position{};  // [m] smoothed
-    Pair velocity{};    // [m/s]
-    float position_error = 0.0F, velocity_error = 0.0F;
+    // its number, from 1; a Tracker uses each number once
+    std::uint32_t id{};
+    // of its center, smoothed [m]
+    Triple position{};
+    // on the plane [m/s]
+    Pair velocity{};
+    // standard deviation of the position in the direction in which it is largest [m]
+    float position_error{};
+    // standard deviation of the velocity in the direction in which it is largest [m/s]
+    float velocity_error{};
 };
 
+// One object on the observation plane, or, with a `reason`, a rejected candidate.
 struct Detection {
-    std::string class_name;
-    float confidence = 0.0F;
-    Triple position{};      // [m] its center, in the plane's frame
-    float distance = 0.0F;  // [m] from the camera
-    Triple bearing{};
-    Pair center{};        // [px]
-    float radius = 0.0F;  // [px]
-    float angular_radius = 0.0F;
-    float distance_by_angle = 0.0F;
-    bool distances_agree = false;
-    std::uint32_t points = 0;
-    std::optional<Track> track;
-};
-
-// A goal post or a robot. Pixels outside of the picture are NaN.
-struct Upright {
-    std::string class_name;
-    float confidence = 0.0F;
-    Pair position{};
-    float distance = 0.0F;
-    Triple bearing{};
-    Pair pixel{};
-    float width = 0.0F;
-};
-
-struct Goal {
-    std::uint32_t left = 0, right = 0;  // indices in Field::posts
-};
-
-struct Segment {
-    std::array<Pair, 2> ends{}, pixels{};
-    float confidence = 0.0F;
-};
-
-struct Circle {
+    // name of its class
+    std::string class_name{};
+    // 0 to 1; with a close look its calibrated probability, otherwise the mean probability of the points inside
+    // its outline
+    float confidence{};
+    // centroid of its outline [px]
     Pair center{};
-    float radius = 0.0F, arc = 0.0F, confidence = 0.0F;
+    // of a disk with the same area as its outline [px]
+    float radius{};
+    // unit vector from the camera to its center
+    Triple bearing{};
+    // its center: where the bearing meets the plane that is parallel to the observation plane, at the height of
+    // the object's center [m]
+    Triple position{};
+    // from the camera to this center [m]
+    float distance{};
+    // angle from its center to its outline. With a close look, it follows from the size that the close look saw;
+    // without one, from the size that fits the points best [rad]
+    float angular_radius{};
+    // distance that follows from `angular_radius` and the real radius [m]
+    float distance_by_angle{};
+    // whether the apparent size is near the size expected at `distance`, within 20 % with a close look, otherwise
+    // within one ring spacing of the mesh
+    bool distances_agree{};
+    // number of mesh points inside its outline
+    std::uint32_t points{};
+    // the object over several frames, if a Tracker follows it
+    std::optional<Track> track{};
 };
 
-struct Crossing {
-    char kind = '?';  // L, T or X
+// Something that stands on the plane: a goal post, or a robot or another obstacle.
+struct Upright {
+    // post or robot
+    std::string class_name{};
+    // calibrated probability of a close look; if the class has none, the probability of a peak; if it has no
+    // peaks either, the mean probability of its points; 0 to 1
+    float confidence{};
+    // its base, which is the middle of a post's foot, or the front of a robot's foot, in the direction of its
+    // middle [m]
     Pair position{};
-    float heading = 0.0F, confidence = 0.0F;
+    // from the camera to the base [m]
+    float distance{};
+    // unit vector from the camera to the base
+    Triple bearing{};
+    // of the base; NaN outside of the picture [px]
+    Pair pixel{};
+    // as seen from the camera [m]
+    float width{};
 };
 
-struct BorderPoint {
-    Pair point{}, pixel{};
+// A straight piece of a field line: its middle line.
+struct Segment {
+    // both ends on the plane [m]
+    std::array<Pair, 2> ends{};
+    // of the ends; NaN outside of the picture [px]
+    std::array<Pair, 2> pixels{};
+    // mean probability of its points, 0 to 1
+    float confidence{};
 };
 
-struct Field {
-    std::vector<Upright> posts;
-    std::vector<Goal> goals;
-    std::vector<Upright> robots;
-    std::vector<Segment> lines;
-    std::optional<Circle> circle;
-    std::vector<Crossing> crossings;
-    std::vector<BorderPoint> border;
+// The center circle.
+struct CenterCircle {
+    // on the plane [m]
+    Pair center{};
+    // of the middle of its line [m]
+    float radius{};
+    // how much of it is seen [rad]
+    float arc{};
+    // mean probability of its points, 0 to 1
+    float confidence{};
 };
 
+// Where two field lines meet at a right angle.
+struct Crossing {
+    // its form
+    char kind{};
+    // on the plane [m]
+    Pair position{};
+    // counterclockwise from the x axis; for T the direction of the line that ends there, away from the crossing;
+    // for L halfway between its two lines, into the corner; for X the direction of either line, from 0 to a right
+    // angle [rad]
+    float heading{};
+    // product of those of its two lines, and down to half of it if one ends in front of the crossing; 0 to 1
+    float confidence{};
+};
+
+// The visible border of the field: a convex polyline from right to left; if parts of it are hidden or too
+// far, the longest part.
+struct Border {
+    // on the plane [m]
+    std::vector<Pair> points{};
+    // of the points [px]
+    std::vector<Pair> pixels{};
+};
+
+// All that a frame shows of the field; empty where the network has no class for it.
+struct FieldFeatures {
+    // goal posts, nearest first
+    std::vector<Upright> posts{};
+    // pairs of indices in `posts`, from 0; the left post of each goal first, as seen from the camera
+    std::vector<std::array<std::uint32_t, 2>> goals{};
+    // robots and other obstacles, nearest first
+    std::vector<Upright> robots{};
+    // straight pieces of the field lines, longest first; a line may have several
+    std::vector<Segment> lines{};
+    // the center circle, if the picture shows it
+    std::optional<CenterCircle> circle{};
+    // where two lines meet at a right angle
+    std::vector<Crossing> crossings{};
+    // the visible border, if the picture shows it
+    std::optional<Border> border{};
+};
+
+// A frame of a live camera.
 struct Frame {
-    std::uint32_t number = 0;
-    double time = 0.0;  // [s] of capture, on CLOCK_MONOTONIC
-    double wall = 0.0;  // [s] of capture, since 1970
-    std::uint32_t points = 0;
-    float age_ms = 0.0F, latency_ms = 0.0F, total_ms = 0.0F;
-    std::vector<Detection> detections;
-    std::optional<Field> field;  // only with a network that knows the classes of the field
+    // number of the frame, from 1
+    std::uint32_t frame{};
+    // time of capture on the monotonic clock [s]
+    double t{};
+    // time of capture since 1970 [s]
+    double wall{};
+    // time from capture to the message [ms]
+    float age_ms{};
+    // time from the frame's arrival to the message [ms]
+    float latency_ms{};
+    // number of mesh points on screen
+    std::uint32_t points{};
+    // the objects, most confident first
+    std::vector<Detection> detections{};
+    // features of the field; only with a network that knows them
+    std::optional<FieldFeatures> field{};
+    // time of each stage and of the whole call [ms]
+    Times timing_ms{};
 };
+// end
 
 // One message: a state with its reason, or a frame in a state.
 struct Message {
     State state = State::starting;
-    double time = 0.0, wall = 0.0;
+    double t = 0.0, wall = 0.0;
     std::string reason;
     std::optional<Frame> frame;
 };
@@ -142,101 +227,149 @@ struct ProtocolError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-constexpr std::uint8_t version = 3;                   // of the binary form
-constexpr std::size_t header_bytes = 64;
 constexpr std::size_t most_bytes = std::size_t{4} << 20;  // a frame full of lines takes a few kilobytes
 
 namespace detail {
 
-// Takes numbers from the front of a message. The lengths are checked before.
+// Takes numbers from the front of a part of a message. names: the classes of the frame. Throws ProtocolError at its end.
 class Cursor {
   public:
-    explicit Cursor(const std::uint8_t* data) : data_(data) {}
+    Cursor(const std::uint8_t* data, std::size_t size, const std::vector<std::string>& names = {})
+        : data_(data), end_(data + size), names_(names) {}
 
     template <typename Number>
     Number take() {
+        static_assert(std::is_trivially_copyable_v<Number>);
+        if (left() < sizeof(Number)) throw ProtocolError("a message's length does not fit its records");
         Number value;
         std::memcpy(&value, data_, sizeof(Number));
         data_ += sizeof(Number);
         return value;
     }
 
-    template <std::size_t count>
-    std::array<float, count> floats() {
-        return take<std::array<float, count>>();
+    const std::string& class_name() {
+        const auto number = take<std::uint32_t>();
+        if (number >= names_.size()) throw ProtocolError("a record has a class without a name");
+        return names_[number];
     }
 
-    const std::uint8_t* data() const { return data_; }
+    char choice(const std::string& letters) {
+        const auto number = take<std::uint32_t>();
+        if (number >= letters.size()) throw ProtocolError("a record has an unknown letter");
+        return letters[number];
+    }
+
+    std::size_t left() const { return static_cast<std::size_t>(end_ - data_); }
 
   private:
     const std::uint8_t* data_;
+    const std::uint8_t* end_;
+    std::vector<std::string> names_;
 };
 
-inline std::string class_at(const std::vector<std::string>& names, std::uint32_t number) {
-    if (number >= names.size()) throw ProtocolError("a record has a class without a name");
-    return names[number];
+template <typename Number>
+void read(Cursor& from, Number& made) {
+    made = from.take<Number>();
 }
 
-inline Detection detection(Cursor& from, const std::vector<std::string>& names) {
-    Detection made;
-    made.class_name = class_at(names, from.take<std::uint32_t>());
-    made.confidence = from.take<float>();
-    made.position = from.floats<3>();
-    made.distance = from.take<float>();
-    made.bearing = from.floats<3>();
-    made.center = from.floats<2>();
-    made.radius = from.take<float>();
-    made.angular_radius = from.take<float>();
-    made.distance_by_angle = from.take<float>();
-    made.distances_agree = from.take<std::uint32_t>() != 0;
-    made.points = from.take<std::uint32_t>();
-    Track track;
-    track.id = from.take<std::uint32_t>();
-    track.position = from.floats<3>();
-    track.velocity = from.floats<2>();
-    track.position_error = from.take<float>();
-    track.velocity_error = from.take<float>();
-    if (track.id != 0) made.track = track;
-    return made;
+inline void read(Cursor& from, bool& made) { made = from.take<std::uint32_t>() != 0; }
+
+inline void read(Cursor& from, std::string& made) { made = from.class_name(); }
+
+template <typename Item>
+void read_list(Cursor& head, Cursor& body, std::vector<Item>& made) {
+    for (auto count = head.take<std::uint32_t>(); count > 0; --count) read(body, made.emplace_back());
 }
 
-inline Upright upright(Cursor& from, const std::vector<std::string>& names) {
-    Upright made;
-    made.class_name = class_at(names, from.take<std::uint32_t>());
-    made.confidence = from.take<float>();
-    made.position = from.floats<2>();
-    made.distance = from.take<float>();
-    made.bearing = from.floats<3>();
-    made.pixel = from.floats<2>();
-    made.width = from.take<float>();
-    return made;
+template <typename Item>
+void read_list(Cursor& head, Cursor& body, std::optional<Item>& made) {
+    for (auto count = head.take<std::uint32_t>(); count > 0; --count) read(body, made ? *made : made.emplace());
 }
 
-inline Segment segment(Cursor& from) {
-    Segment made;
-    for (auto* pairs : {&made.ends, &made.pixels})
-        for (Pair& pair : *pairs) pair = from.floats<2>();
-    made.confidence = from.take<float>();
-    return made;
+// messages: readers
+constexpr std::uint32_t layout_number = 3392188055U;
+constexpr std::size_t header_bytes = 128;
+
+inline void read(Cursor& from, Track& made) {
+    read(from, made.id);
+    read(from, made.position);
+    read(from, made.velocity);
+    read(from, made.position_error);
+    read(from, made.velocity_error);
 }
 
-inline Circle circle(Cursor& from) {
-    Circle made;
-    made.center = from.floats<2>();
-    made.radius = from.take<float>();
-    made.arc = from.take<float>();
-    made.confidence = from.take<float>();
-    return made;
+inline void read(Cursor& from, Detection& made) {
+    read(from, made.class_name);
+    read(from, made.confidence);
+    read(from, made.center);
+    read(from, made.radius);
+    read(from, made.bearing);
+    read(from, made.position);
+    read(from, made.distance);
+    read(from, made.angular_radius);
+    read(from, made.distance_by_angle);
+    read(from, made.distances_agree);
+    read(from, made.points);
+    read(from, made.track.emplace());
+    if (made.track->id == 0) made.track.reset();
 }
 
-inline Crossing crossing(Cursor& from) {
-    Crossing made;
-    made.kind = static_cast<char>(from.take<std::uint32_t>());
-    made.position = from.floats<2>();
-    made.heading = from.take<float>();
-    made.confidence = from.take<float>();
-    return made;
+inline void read(Cursor& from, Upright& made) {
+    read(from, made.class_name);
+    read(from, made.confidence);
+    read(from, made.position);
+    read(from, made.distance);
+    read(from, made.bearing);
+    read(from, made.pixel);
+    read(from, made.width);
 }
+
+inline void read(Cursor& from, Segment& made) {
+    read(from, made.ends);
+    read(from, made.pixels);
+    read(from, made.confidence);
+}
+
+inline void read(Cursor& from, CenterCircle& made) {
+    read(from, made.center);
+    read(from, made.radius);
+    read(from, made.arc);
+    read(from, made.confidence);
+}
+
+inline void read(Cursor& from, Crossing& made) {
+    made.kind = from.choice("LTX");
+    read(from, made.position);
+    read(from, made.heading);
+    read(from, made.confidence);
+}
+
+inline void read(Cursor& from, Border& made) {
+    read(from, made.points.emplace_back());
+    read(from, made.pixels.emplace_back());
+}
+
+inline void read(Cursor& head, Cursor& body, Frame& made) {
+    read(head, made.frame);
+    read(head, made.t);
+    read(head, made.wall);
+    read(head, made.age_ms);
+    read(head, made.latency_ms);
+    read(head, made.points);
+    read_list(head, body, made.detections);
+    const bool has_field = head.take<std::uint32_t>() != 0;
+    auto& field = made.field.emplace();
+    read_list(head, body, field.posts);
+    read_list(head, body, field.goals);
+    read_list(head, body, field.robots);
+    read_list(head, body, field.lines);
+    read_list(head, body, field.circle);
+    read_list(head, body, field.crossings);
+    read_list(head, body, field.border);
+    if (!has_field) made.field.reset();
+    read(head, made.timing_ms);
+}
+// end
 
 inline std::vector<std::string> lines_of(const std::string& text) {
     std::vector<std::string> lines;
@@ -255,72 +388,47 @@ inline std::size_t message_bytes(const std::uint8_t* data, std::size_t size) {
     if (size > 0 && data[0] == '{')
         throw ProtocolError("the socket sends lines of JSON; set [output] unix_format = \"binary\"");
     if (size < 4) return 0;
-    const std::size_t length = std::size_t{4} + detail::Cursor(data).take<std::uint32_t>();
-    if (length < header_bytes || length > most_bytes)
+    const std::size_t length = std::size_t{4} + detail::Cursor(data, size).take<std::uint32_t>();
+    if (length < detail::header_bytes || length > most_bytes)
         throw ProtocolError("a message of " + std::to_string(length) + " bytes; is this vm-detect?");
     return length;
 }
 
 // A whole message, with its first four bytes. Throws ProtocolError.
 inline Message decode(const std::uint8_t* data, std::size_t size) {
+    using detail::header_bytes;
     if (size < header_bytes || message_bytes(data, size) != size) throw ProtocolError("a message was cut off");
-    detail::Cursor head(data + 4);
-    const auto found = head.take<std::uint8_t>();
-    if (found != version)
-        throw ProtocolError("version " + std::to_string(found) + " of the binary form, but vm_detect.hpp reads version " +
-                            std::to_string(version) + "; use the header of the installed vm-detect");
-    const auto kind = head.take<std::uint8_t>(), state = head.take<std::uint8_t>(), has_field = head.take<std::uint8_t>();
-    if (kind > 1 || state >= static_cast<std::uint8_t>(State::unreachable)) throw ProtocolError("an unknown message");
+    detail::Cursor head(data + 4, header_bytes - 4);
+    const auto layout = head.take<std::uint32_t>();
+    if (layout != detail::layout_number)
+        throw ProtocolError("layout " + std::to_string(layout) + " of the binary form, but vm_detect.hpp reads layout " +
+                            std::to_string(detail::layout_number) + "; use the header of the installed vm-detect");
+    const auto is_frame = head.take<std::uint32_t>(), state = head.take<std::uint32_t>();
+    if (is_frame > 1 || state >= static_cast<std::uint32_t>(State::unreachable)) throw ProtocolError("an unknown message");
+    const std::size_t text_bytes = detail::Cursor(data + header_bytes - 4, 4).take<std::uint32_t>();
+    if (text_bytes > size - header_bytes) throw ProtocolError("a message's length does not fit its text");
+    std::string text(reinterpret_cast<const char*>(data) + (size - text_bytes), text_bytes);
     Message made;
     made.state = static_cast<State>(state);
-    made.time = head.take<double>();
-    made.wall = head.take<double>();
+    detail::Cursor body(data + header_bytes, size - header_bytes - text_bytes, detail::lines_of(text));
     Frame frame;
-    frame.time = made.time;
-    frame.wall = made.wall;
-    frame.number = head.take<std::uint32_t>();
-    frame.points = head.take<std::uint32_t>();
-    frame.age_ms = head.take<float>();
-    frame.latency_ms = head.take<float>();
-    frame.total_ms = head.take<float>();
-
-    // detections, posts, goals, robots, lines, circle, crossings, border
-    constexpr std::array<std::size_t, 8> record_bytes{96, 44, 8, 44, 36, 20, 20, 16};
-    const auto counts = head.take<std::array<std::uint16_t, 8>>();
-    const std::size_t text_bytes = head.take<std::uint16_t>();
-    std::size_t expected = header_bytes + text_bytes;
-    for (std::size_t each = 0; each < counts.size(); ++each) expected += counts[each] * record_bytes[each];
-    if (expected != size) throw ProtocolError("a message's length does not fit its records");
-    std::string text(reinterpret_cast<const char*>(data) + (size - text_bytes), text_bytes);
-    if (kind == 0) {
+    detail::read(head, body, frame);
+    if (body.left() != 0) throw ProtocolError("a message's length does not fit its records");
+    made.t = frame.t;
+    made.wall = frame.wall;
+    if (is_frame == 0) {
         made.reason = std::move(text);
         return made;
     }
-
-    const std::vector<std::string> names = detail::lines_of(text);
-    detail::Cursor body(data + header_bytes);
-    Field field;
-    for (int i = 0; i < counts[0]; ++i) frame.detections.push_back(detail::detection(body, names));
-    for (int i = 0; i < counts[1]; ++i) field.posts.push_back(detail::upright(body, names));
-    for (int i = 0; i < counts[2]; ++i) {
-        const auto pair = body.take<std::array<std::uint32_t, 2>>();
-        if (std::max(pair[0], pair[1]) >= field.posts.size()) throw ProtocolError("a goal has a post that is not there");
-        field.goals.push_back({pair[0], pair[1]});
-    }
-    for (int i = 0; i < counts[3]; ++i) field.robots.push_back(detail::upright(body, names));
-    for (int i = 0; i < counts[4]; ++i) field.lines.push_back(detail::segment(body));
-    for (int i = 0; i < counts[5]; ++i) field.circle = detail::circle(body);
-    for (int i = 0; i < counts[6]; ++i) field.crossings.push_back(detail::crossing(body));
-    for (int i = 0; i < counts[7]; ++i) {
-        const Pair point = body.floats<2>();
-        field.border.push_back({point, body.floats<2>()});
-    }
-    if (has_field != 0) frame.field = std::move(field);
+    if (frame.field)
+        for (const auto& goal : frame.field->goals)
+            if (std::max(goal[0], goal[1]) >= frame.field->posts.size())
+                throw ProtocolError("a goal has a post that is not there");
     made.frame = std::move(frame);
     return made;
 }
 
-// Seconds on the clock of Frame::time.
+// Seconds on the clock of Frame::t.
 inline double now() {
     timespec time{};
     clock_gettime(CLOCK_MONOTONIC, &time);
@@ -367,7 +475,7 @@ class Client {
 
     // The newest frame, or nullptr if it was captured longer than max_age [s] ago. Valid until the next update().
     const Frame* frame(double max_age) const {
-        return frame_ && now() - frame_->time <= max_age ? &*frame_ : nullptr;
+        return frame_ && now() - frame_->t <= max_age ? &*frame_ : nullptr;
     }
 
   private:

@@ -37,7 +37,7 @@ std::string decide(const vm_detect::Client& detector) {
     for (const vm_detect::Detection& each : frame->detections)
         if (each.class_name == "ball" && (nearest == nullptr || each.distance < nearest->distance)) nearest = &each;
     if (nearest == nullptr) return "turn: there is no ball in view";
-    const vm_detect::Pair place = expected_place(*nearest, frame->time);
+    const vm_detect::Pair place = expected_place(*nearest, frame->t);
     if (std::hypot(place[0], place[1]) < 0.3F) return "kick: the ball is in front";
     char text[80];
     std::snprintf(text, sizeof(text), "walk: the ball is %.1f m ahead and %.1f m to the left", place[0], place[1]);

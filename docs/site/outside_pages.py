@@ -1,4 +1,4 @@
-"""Brings pages that lie outside of docs/ into the site, and points links to them.
+"""Brings pages that lie outside of docs/, and those made from the programs, into the site, and points links to them.
 
 On a code host the pages link to each other as files of the repository. In the site, a link to one of PAGES leads to its
 page in the site; a link to any other file outside of docs/ becomes plain text. A link to a missing file stays as it is,
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from pathlib import Path, PurePosixPath
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -29,7 +30,12 @@ _LINK = re.compile(r"(?<!!)\[([^\]]*)\]\(([^)#\s]+)(#[^)\s]*)?\)|(!\[[^\]]*\])\(
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the outside pages."""
+    """Add the outside pages and the made ones."""
+    sys.path.insert(0, str(TOP / "docs"))
+    from help_pages import site_pages
+
+    for name, text in site_pages().items():
+        files.append(File.generated(config, name, content=text))
     for source, place in PAGES.items():
         files.append(File.generated(config, place, content=(TOP / source).read_text()))
     return files

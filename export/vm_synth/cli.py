@@ -18,7 +18,7 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, VisualMeshError, unknown
 from vm_embedded.files import check_writable, write_file
-from vm_workstation.contact_sheet import check_sheet_path, check_sheet_size, choose_indices, write_sheet
+from vm_workstation.contact_sheet import check_sheet_path, choose_indices, write_sheet
 from vm_workstation.option_types import add_set, at_least
 from vm_workstation.stopping import stoppable
 from vm_workstation.worker_process import check_shared_memory
@@ -93,6 +93,10 @@ def parser() -> argparse.ArgumentParser:
     return made
 
 
+_COLUMNS, _WIDTH = 6, 320
+"""Pictures in a row of a contact sheet, and their width [px]."""
+
+
 def preview_parser() -> argparse.ArgumentParser:
     """The options of vm-synth preview OUT."""
     made = Parser(
@@ -103,10 +107,6 @@ def preview_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--count", type=at_least(1), default=24, metavar="N", help="number of pictures; default 24")
-    made.add_argument("--columns", type=at_least(1), default=6, metavar="N", help="pictures per row; default 6")
-    made.add_argument(
-        "--width", type=at_least(16), default=320, metavar="PX", help="width of each picture; default 320"
-    )
     which = made.add_mutually_exclusive_group()
     which.add_argument(
         "--first",
@@ -128,9 +128,6 @@ def check_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("out", type=Path, metavar="OUT", help="folder of the set")
     made.add_argument("--quick", action="store_true", help="skip images and masks")
-    made.add_argument(
-        "--shards", type=at_least(1), default=1, metavar="N", help="report on each of N shards; default 1"
-    )
     made.add_argument(
         "--plots", type=Path, metavar="FILE", help="write histograms to a .png, .svg or .pdf; needs matplotlib"
     )
@@ -290,19 +287,18 @@ def _preview(options: argparse.Namespace) -> int:
         raise InputError(f"there is no folder {options.out}")
     check_writable(output, files_in(options.out))
     there = indices_in(options.out)
-    check_sheet_size(options.width * min(options.columns, options.count), options.width)
     cells, name = [], "ball"
     for index in choose_indices(there, options.count, options.first, options.seed):
         try:
             shown = read_labeled(options.out, index)
-            cells.append(cell(shown, options.width))
+            cells.append(cell(shown, _WIDTH))
             name = object_name(shown.truth)
         except InputError as error:
             print(f"vm-synth: skipped {error}", file=sys.stderr)
     if not cells:
         after = "" if options.first is None else f" from number {options.first} on"
         raise InputError(f"{options.out} has no complete pictures{after}; run vm-synth check {options.out}")
-    made = sheet(cells, options.columns, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures", name)
+    made = sheet(cells, _COLUMNS, f"{options.out.resolve().name}: {len(cells)} of {len(there)} pictures", name)
     write_sheet(output, made)
     print(f"{output}: {len(cells)} pictures")
     return EXIT_OK
@@ -319,7 +315,7 @@ def _check(options: argparse.Namespace) -> int:
         found = inspect(options.out, options.quick, bar.advance)
     finally:
         bar.clear()
-    print(tables(found, options.shards))
+    print(tables(found))
     if options.json is not None:
         write_file(options.json, to_json(as_json(found), indent=1) + "\n")
     if options.plots is not None and found.facts:

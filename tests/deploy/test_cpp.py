@@ -16,18 +16,39 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.soak.failing_camera import Fault
 from tests.vm_embedded.live.running import PATIENCE, running
 from tests.vm_embedded.output.features import demo_frame, full, scene
 from vm_embedded import Tracker
+from vm_embedded.borders.records import entries
 from vm_embedded.cameras.camera import Shot
-from vm_embedded.output.binary_form import RECORDS, VERSION, to_binary
-from vm_embedded.output.messages import STATES, live_message, state_message
+from vm_embedded.detection.detections import STAGES
+from vm_embedded.output.binary_form import HEADER as HEAD
+from vm_embedded.output.binary_form import LAYOUT, number_type, to_binary
+from vm_embedded.output.messages import LiveFrame, live_frame, state_message
 
 CHECKOUT = Path(__file__).parents[2]
 HEADER = CHECKOUT / "deploy" / "cpp" / "vm_detect.hpp"
 EXAMPLE = CHECKOUT / "docs" / "examples" / "behavior.cpp"
 STRICT = ("-std=c++17", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wshadow", "-pedantic")
 BINARY = ("--output-unix-format", "binary")
+
+
+def printers(record, done):
+    """Functions of C++ that print the fields of a record and its parts, under their names in JSON."""
+    fields = [each for each in entries(record) if (each.is_record or number_type(each)) and each.name != "state"]
+    for each in fields:
+        if each.is_record and each.type not in done:
+            yield from printers(each.type, done | {each.type})
+            done.add(each.type)
+    name = "Frame" if record is LiveFrame else record.__name__
+    yield f"void print_fields(const {name}& made) {{\n"
+    for each in fields:
+        if each.many is dict:
+            yield "".join(f'print("{stage}", made.{each.attribute}.{stage});\n' for stage in STAGES)
+        else:
+            yield f'print("{each.name}", made.{each.attribute});\n'
+    yield "}\n"
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +61,8 @@ def compiled(tmp_path_factory):
     def build(source, *options):
         target = folder / f"{source.stem}{len(options)}"
         if not target.exists():
-            command = ["g++", *STRICT, *options, "-I", HEADER.parent, source, "-o", target]
+            (folder / "printers.hpp").write_text("".join(printers(LiveFrame, set())))
+            command = ["g++", *STRICT, *options, "-I", HEADER.parent, "-I", folder, source, "-o", target]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             assert done.returncode == 0, done.stderr
         return target
@@ -72,80 +94,44 @@ def messages():
     view = detections.observation.view
     tracked = Tracker().update(replace(detections, field=scene(view)), 1.0)
     results = [detections, tracked, replace(detections, field=full(view)), replace(detections, objects=())]
-    frames = [live_message(number, "ok", shot, each, now) for number, each in enumerate(results, start=2**32 + 5)]
+    numbered = enumerate(results, start=2**32 + 5)
+    frames = [live_frame(number, "ok", shot, each, now).as_dict() for number, each in numbered]
     return [*frames, state_message("camera_lost", "no new frame for 1.0 s - 10 µs late"), state_message("ok", "")]
 
 
+def leaves(name, value):
+    """What dump.cpp prints for a value of a message: names, each with a number or a text."""
+    if isinstance(value, dict):
+        for each, part in value.items():
+            if part is not None and each not in ("type", "state", "truth", "reason"):
+                yield from leaves(each, part)
+    elif isinstance(value, list):
+        for each in value:
+            yield from leaves(name, each)
+    else:
+        yield name, np.nan if value is None else value
+
+
 def expected_lines(message):
-    """What dump.cpp prints for a message: names, and numbers."""
-
-    def upright(name, each):
-        yield f"{name}.class", each["class"]
-        yield name, [each["confidence"], each["distance"], each["width"]]
-        for part in ("position", "bearing", "pixel"):
-            yield name, each[part]
-
+    """What dump.cpp prints for a message."""
     yield "state", f"{message['state']} {message.get('reason', '')}"
-    if message["type"] == "state":
-        return
-    yield "times", [message["t"], message["wall"]]
-    yield "frame", [message["frame"] % 2**32, message["points"]]
-    yield "ms", [message["age_ms"], message["latency_ms"], message["timing_ms"]["total"]]
-    for each in message["detections"]:
-        yield "detection.class", each["class"]
-        names = ("confidence", "distance", "radius", "angular_radius", "distance_by_angle", "distances_agree", "points")
-        yield "detection", [float(each[name]) for name in names]
-        for name in ("position", "bearing", "center"):
-            yield f"detection.{name}", each[name]
-        if "track" in each:
-            yield "track", [each["track"][name] for name in ("id", "position_error", "velocity_error")]
-            for name in ("position", "velocity"):
-                yield f"track.{name}", each["track"][name]
-    yield "field", [int("field" in message)]
-    field = message.get("field", dict.fromkeys(("posts", "goals", "robots", "lines", "crossings"), ()))
-    for each in field["posts"]:
-        yield from upright("post", each)
-    for each in field["goals"]:
-        yield "goal", each
-    for each in field["robots"]:
-        yield from upright("robot", each)
-    for each in field["lines"]:
-        yield from (("line.end", pair) for pair in each["ends"])
-        yield from (("line.pixel", pair) for pair in each["pixels"])
-        yield "line", [each["confidence"]]
-    if circle := field.get("circle"):
-        yield "circle", [circle["radius"], circle["arc"], circle["confidence"]]
-        yield "circle.center", circle["center"]
-    for each in field["crossings"]:
-        yield "crossing.kind", each["kind"]
-        yield "crossing", [*each["position"], each["heading"], each["confidence"]]
-    if border := field.get("border"):
-        for point, pixel in zip(border["points"], border["pixels"], strict=True):
-            yield "border", point
-            yield "border.pixel", pixel
+    if message["type"] == "frame":
+        times = dict.fromkeys(STAGES, np.nan) | message["timing_ms"]
+        yield from leaves("", message | {"frame": message["frame"] % 2**32, "timing_ms": times})
 
 
 def test_it_decodes_the_numbers_of_the_json(dump, messages):
     lines = dump(b"".join(map(to_binary, messages)))
     expected = [each for message in messages for each in expected_lines(message)]
-    assert len(lines) == len(expected) > 500
-    for line, (name, values) in zip(lines, expected, strict=True):
-        found, _, rest = line.partition(" ")
-        assert found == name
-        if isinstance(values, str):
-            assert rest == values
+    assert [line.partition(" ")[0] for line in lines] == [name for name, _ in expected]
+    assert len(lines) > 1000
+    for line, (name, value) in zip(lines, expected, strict=True):
+        found = line.partition(" ")[2]
+        if isinstance(value, str):
+            assert found == value
         else:
-            numbers = np.array(values, float)  # null is NaN
-            np.testing.assert_allclose([float(each) for each in rest.split()], numbers, rtol=1e-6, err_msg=line)
-
-
-def test_its_layout_is_that_of_the_detector():
-    text = HEADER.read_text()
-    (sizes,) = re.findall(r"record_bytes\{([\d, ]+)\}", text)
-    assert [int(each) for each in sizes.split(",")] == [each.itemsize for each in RECORDS.values()]
-    assert f"version = {VERSION};" in text
-    (states,) = re.findall(r"enum class State : std::uint8_t \{ ([\w, ]+) \}", text)
-    assert states.split(", ") == [*STATES, "unreachable"]
+            tolerance = 1e-15 if name in ("t", "wall") else 1e-6
+            np.testing.assert_allclose(float(found), value, rtol=tolerance, err_msg=line)
 
 
 @settings(max_examples=60)
@@ -172,11 +158,11 @@ def test_it_says_what_is_wrong(dump, content, says):
     assert says in line
 
 
-def test_another_version_is_an_error(dump, messages):
+def test_another_layout_is_an_error(dump, messages):
     content = bytearray(to_binary(messages[0]))
-    content[4] = VERSION + 1
+    content[4:8] = (LAYOUT ^ 1).to_bytes(4, "little")
     (line,) = dump(bytes(content))
-    assert f"version {VERSION + 1} of the binary form" in line
+    assert f"layout {LAYOUT ^ 1} of the binary form" in line
 
 
 class Behaving:
@@ -220,12 +206,12 @@ def behaving(compiled, path):
 
 @pytest.mark.long
 def test_a_behavior_walks_to_the_ball_and_stands_while_the_camera_is_lost(compiled, tmp_path):
-    source, path = tmp_path / "script.toml", tmp_path / "lines"
-    source.write_text('faults = [{ kind = "unplug", at = 4.0, seconds = 4.0 }]\n')
-    camera = ("--camera", f"fault:{source}", "--camera-lost-ms", 500, "--camera-retry-ms", 50, "--track")
+    path = tmp_path / "lines"
+    camera = ("--camera-lost-ms", 500, "--camera-retry-ms", 50, "--track")
+    unplugged = Fault("unplug", at=4.0, seconds=4.0)
     with behaving(compiled, path) as robot:
         robot.wait_for("stand: unreachable: can't connect")
-        with running(tmp_path, *camera, "--output-unix", path, *BINARY):
+        with running(tmp_path, *camera, "--output-unix", path, *BINARY, faults=[unplugged]):
             assert re.match(r"walk: the ball is -?\d\.\d m ahead", robot.wait_for("walk: "))
             robot.wait_for("stand: camera_lost")
             robot.wait_for("walk: ")
@@ -264,7 +250,7 @@ def test_a_behavior_survives_what_is_no_detector(compiled, tmp_path, messages):
                 (b'{"type": "state"}\n', "stand: unreachable: the socket sends lines of JSON"),
                 (b"\xff" * 1000, "stand: unreachable: a message of"),
                 (whole[:-3], "stand: unreachable: vm-detect has closed the connection"),
-                (np.random.default_rng(0).bytes(64), "stand: unreachable: "),
+                (np.random.default_rng(0).bytes(HEAD.itemsize), "stand: unreachable: "),
             ):
                 connection, _ = listening.accept()
                 with connection:

@@ -27,9 +27,9 @@ def git(folder, *words):
     return subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | IDENTITY).stdout.strip()
 
 
-def release(folder, *words):
+def release(folder, *words, identity=IDENTITY):
     command = [sys.executable, folder / "deploy" / "release.py", *words]
-    return subprocess.run(command, capture_output=True, text=True, env=os.environ | IDENTITY)
+    return subprocess.run(command, capture_output=True, text=True, env=os.environ | identity)
 
 
 @pytest.fixture(scope="module")
@@ -120,4 +120,13 @@ def test_what_is_missing_is_said_before_anything_changes(clone, words, said):
     done = release(clone, *words)
     assert done.returncode == 1
     assert said in done.stderr
+    assert not git(clone, "status", "--porcelain")
+
+
+def test_without_a_git_identity_nothing_changes(clone):
+    unknown = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_COUNT": "1"}
+    unknown |= {"GIT_CONFIG_KEY_0": "user.useConfigOnly", "GIT_CONFIG_VALUE_0": "true"}
+    done = release(clone, "1.2.3", "--url", URL, identity=unknown)
+    assert done.returncode == 1
+    assert "Please tell me who you are" in done.stderr
     assert not git(clone, "status", "--porcelain")

@@ -24,7 +24,7 @@ from vm_embedded.config.toml_reader import parse_toml
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.output.binary_form import HEADER, to_binary
-from vm_embedded.output.messages import live_message, to_json_line, to_ros
+from vm_embedded.output.messages import live_frame, to_json_line
 from vm_export.reference import named_class
 from vm_label.box_folder import read_box_folder
 from vm_train.boxes.read import read_boxes
@@ -91,12 +91,11 @@ def _use_model(name: str) -> None:
     objects = tuple(replace(each, class_name=manifest.classes[0].name) for each in _FRAME.objects)
     frame = replace(_FRAME, objects=objects)
     now = time.monotonic()
-    message = live_message(1, "ok", Shot(_IMAGE, now, arrived=now), frame, now)
+    message = live_frame(1, "ok", Shot(_IMAGE, now, arrived=now), frame, now).as_dict()
     (line,) = to_json_line(message).splitlines()
     assert {each["class"] for each in json.loads(line)["detections"]} == {name}
-    (line,) = to_json_line(to_ros(message, "base")).splitlines()
     binary = to_binary(message)
-    size = HEADER.unpack_from(binary)[-2]
+    size = np.frombuffer(binary, HEADER, 1)["text"][0]
     assert binary[len(binary) - size :].decode().splitlines() == [name]
     frame.draw()
     html_table(["class"], [[name]]).encode()

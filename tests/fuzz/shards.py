@@ -1,13 +1,13 @@
-"""Tar archives of pictures, plain or gzipped, as vm-train streams them and as it reads them at places."""
+"""Tar archives of pictures, plain or gzipped, as vm-train import reads them."""
 
 import gzip
 import zlib
 from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from vm_embedded.errors import VisualMeshError
-from vm_train.data.picture_files import PictureFault
-from vm_train.data.shard_index import open_shards
-from vm_train.data.shard_stream import stream
+from vm_train.formats.picture_folder import PictureFolder
+from vm_train.formats.shards import import_shard
 
 from .scratch import scratch
 
@@ -20,17 +20,9 @@ def run(data: bytes) -> None:
         if data.startswith(b"\x1f\x8b"):
             data = gzip.compress(_with_checksums(gzip.decompress(data)), 1)
     path.write_bytes(_with_checksums(data))
-    refusal = None
-    try:
-        for _ in stream([path], (1,), buffer=2, report=lambda _: None):
+    with TemporaryDirectory(dir=path.parent) as folder:
+        for _ in import_shard(str(path), PictureFolder(Path(folder))):
             pass
-    except VisualMeshError as error:
-        refusal = error
-    for files in open_shards(path):
-        with suppress(PictureFault):
-            files.raw()
-    if refusal:
-        raise refusal
 
 
 def _with_checksums(data: bytes) -> bytes:

@@ -8,13 +8,15 @@ import subprocess
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from tests.vm_embedded.live.running import arguments
 from vm_embedded.live.control import ask
+
+from .failing_camera import Fault
 
 PATIENCE = 120.0
 """Seconds after which a detector that does not become what it should is given up."""
@@ -113,11 +115,14 @@ def status(folder: Path) -> dict[str, Any]:
 
 @contextmanager
 def detector(
-    folder: Path, *options: object, check_frame: Callable[[Mapping[str, Any]], bool] = lambda _: True
+    folder: Path,
+    *options: object,
+    faults: Sequence[Fault] = (),
+    check_frame: Callable[[Mapping[str, Any]], bool] = lambda _: True,
 ) -> Iterator[Detector]:
     """A detector with its sockets in a folder. It ends with the block, whatever happens in it."""
     folder.mkdir(parents=True, exist_ok=True)
-    command = arguments(folder, *options)
+    command = arguments(folder, *options, faults=faults)
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         try:
             yield Detector(process, check_frame)

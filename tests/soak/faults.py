@@ -1,6 +1,6 @@
 """Each kind of camera fault a thousand times: no stale detection, well again every time, and memory stays flat.
 
-Detectors run side by side, each on a camera of its own, whose script has all kinds of faults in any order.
+Detectors run side by side, each on a camera of its own, which has all kinds of faults in any order.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from vm_embedded.cameras.fault import KINDS, Fault, FaultScript
-
 from .detectors import Detector, detector, status
+from .failing_camera import KINDS, Fault
 
 MAX_AGE_MS = 200.0
 QUICK = ("--camera-lost-ms", 250, "--camera-open-ms", 500, "--camera-retry-ms", 20, "--camera-longest-retry-ms", 80)
@@ -26,18 +25,6 @@ SMALL = ("--camera-width", 320, "--camera-height", 240, "--camera-fps", 12, "--c
 
 HARMFUL = ("frozen", "truncated", "ahead", "behind", "empty", "depth")
 """Faults whose frames must never be reported."""
-
-_SCRIPT = """\
-source = "synthetic"
-
-[random]
-count = {count}
-seed = {seed}
-first = {first}
-shortest = 0.1
-longest = 0.4
-pause = {pause}
-"""
 
 _SETTLED = 0.1
 """Part of a soak after which memory must be flat."""
@@ -114,16 +101,12 @@ def soak_faults(
     last one.
     """
     report = FaultReport()
-    scripts = [_write_script(folder / f"{at}.toml", count, seed + at, pause, first) for at in range(detectors)]
+    scripts = [random_faults(count, seed + at, pause, first) for at in range(detectors)]
     began = time.monotonic()
     with ExitStack() as stack:
         running = [
-            stack.enter_context(
-                detector(
-                    folder / str(at), "--camera", f"fault:{folder / f'{at}.toml'}", *QUICK, *SMALL, check_frame=is_fresh
-                )
-            )
-            for at in range(detectors)
+            stack.enter_context(detector(folder / str(at), *QUICK, *SMALL, faults=faults, check_frame=is_fresh))
+            for at, faults in enumerate(scripts)
         ]
         for each in running:
             each.wait(each.is_ok)
@@ -153,10 +136,16 @@ def soak_faults(
     return report
 
 
-def _write_script(path: Path, count: int, seed: int, pause: float, first: float) -> Sequence[Fault]:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(_SCRIPT.format(count=count, seed=seed, pause=pause, first=first))
-    return FaultScript.read(path).faults
+def random_faults(count: int, seed: int, pause: float, first: float) -> Sequence[Fault]:
+    """Faults of 0.1 to 0.4 s, one after another; all kinds are equally frequent. first, pause: see soak_faults."""
+    random = np.random.default_rng(seed)
+    kinds = np.resize(list(KINDS), count)
+    random.shuffle(kinds)
+    faults, at = [], first
+    for kind in kinds.tolist():
+        faults.append(Fault(kind, at, float(random.uniform(0.1, 0.4))))
+        at += faults[-1].seconds + pause
+    return faults
 
 
 def recovered(found: Detector, faults: Sequence[Fault]) -> list[str]:

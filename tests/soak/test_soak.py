@@ -5,10 +5,9 @@ import sys
 
 import pytest
 
-from vm_embedded.cameras.fault import KINDS, Fault
-
 from .calls import CallsReport, soak_calls
 from .connections import SOCKETS, soak_connections
+from .failing_camera import KINDS, Fault
 from .faults import growth, is_fresh, recovered, soak_faults
 
 

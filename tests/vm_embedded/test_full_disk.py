@@ -10,7 +10,6 @@ import pytest
 
 from tests.vm_embedded.live.test_damaged_files import refused
 from tests.vm_export.checkpoints import checkpoint
-from vm_embedded.config.toml_editor import write_entries
 from vm_embedded.files import atomic_write
 
 
@@ -54,7 +53,6 @@ WRITERS = {
     "bytes": ("a.json", write_plainly),
     "two steps": ("a.json", write_in_two_steps),
     "checkpoint": ("model.pt", lambda path: checkpoint().save(path)),
-    "settings": ("vm.toml", lambda path: write_entries(path, "detector", {"threads": 2})),
 }
 
 

@@ -113,7 +113,7 @@ def write_pictures(folder, count):
 
 def upright(position, name="goal"):
     """A reported upright at a place (2,) [m]; only its place counts."""
-    return Upright(name, np.array(position, dtype=float), 0.0, np.zeros(3), np.zeros(2), 0.1, 0.9)
+    return Upright(name, 0.9, np.array(position, dtype=float), 0.0, np.zeros(3), np.zeros(2), 0.1)
 
 
 def features(posts=(), robots=(), lines=(), circle=None, border=None):

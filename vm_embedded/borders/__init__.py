@@ -1,1 +1,1 @@
-"""The borders to the system and its libraries: sockets, text that others wrote, and OpenCV."""
+"""The borders to the system and its libraries: sockets, text that others wrote, OpenCV, and messages."""

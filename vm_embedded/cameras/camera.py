@@ -71,7 +71,7 @@ class CameraSettings:
     source: str = file_name(
         "",
         "camera number, /dev/videoN or /dev/v4l/by-id/...; http, https or rtsp address; gstreamer:PIPELINE; video file "
-        "or folder of images, played at their frame rate; synthetic; fault:SCRIPT; ros, for vm-ros only",
+        "or folder of images, played at their frame rate; synthetic; ros, for vm-ros only",
     )
     pixel_format: str = text_line("", "FOURCC to request from a device, such as MJPG or YUYV; empty: the device's own")
     width: int = number(0, "width to request from a device; 0: the device's own", "px", (0, 20000))

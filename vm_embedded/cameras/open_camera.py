@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Callable
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from ..borders.opencv_text import check_address
 from ..errors import InputError, unknown
 from ..files import exists, is_file, there
 from .camera import Camera, CameraSettings
-from .fault import FaultCamera, Faults, FaultScript
 from .files import FileCamera
 from .http_get import parse_url
 from .mjpeg import MjpegCamera, NotMotionJpegError
@@ -41,18 +39,13 @@ def is_live(source: str) -> bool:
     prefix = source.partition(":")[0]
     node = device_path(source)
     return not _is_path(source) and (
-        prefix in ("synthetic", "fault", "gstreamer", ROS)
-        or "://" in source
-        or (node is not None and not is_file(node))
+        prefix in ("synthetic", "gstreamer", ROS) or "://" in source or (node is not None and not is_file(node))
     )
 
 
 def brings_lens_and_pose(source: str) -> bool:
-    """Whether the camera of a live source needs no configured lens and pose: its shots bring them.
-
-    A fault script also counts, whichever camera it adds faults to.
-    """
-    return source.partition(":")[0] in ("synthetic", "fault", ROS) and not _is_path(source)
+    """Whether the camera of a live source needs no configured lens and pose: its shots bring them."""
+    return source.partition(":")[0] in ("synthetic", ROS) and not _is_path(source)
 
 
 def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
@@ -65,10 +58,6 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
         return lambda: FileCamera(settings, raw)
     if source == ROS:
         raise InputError("camera ros, a topic of ROS, works only with vm-ros")
-    if source.startswith("fault:"):
-        script = FaultScript.read(Path(source.removeprefix("fault:")))
-        faults, inner = Faults(script), camera_opener(replace(settings, source=script.source), raw)
-        return lambda: FaultCamera(faults, inner)
     if source.partition(":")[0] == "synthetic":
         parse_motion(source)
         if raw:
@@ -88,7 +77,7 @@ def camera_opener(settings: CameraSettings, raw: bool = False) -> Opener:
     if not exists(there(Path(source))) and not glob.glob(source, recursive=True):  # noqa: PTH207 (as in image_files.py)
         raise InputError(
             f"no such camera: {without_password(source)!r}; give a device, an address, an existing file or folder, "
-            "a pattern of images, synthetic, fault:SCRIPT or gstreamer:PIPELINE"
+            "a pattern of images, synthetic or gstreamer:PIPELINE"
         )
     return lambda: FileCamera(settings, raw)
 

@@ -13,11 +13,10 @@ from typing import Any
 
 import cv2
 
-from ..config.toml_editor import check_editable, write_entries
 from ..detection.detector import Detector
 from ..detection.settings import Settings
 from ..errors import InputError
-from ..files import check_not_input, check_writable, is_file, write_file
+from ..files import check_writable, write_file
 from ..live.configuration import Configuration
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model
@@ -27,8 +26,8 @@ from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
 from .program import EXIT_OK, Parser, complain, program, run_or_complain
 from .progress import ProgressBar
-from .tuning import TUNED, fastest_settings
-from .workload import Workload, make_workload
+from .tuning import fastest_settings
+from .workload import SWAY, SWING, Workload, make_workload
 
 _TUNING_FRAMES = 300
 """Ten seconds: in a shorter walk most calls are cold."""
@@ -53,10 +52,6 @@ def parser() -> argparse.ArgumentParser:
     )
     work.add_argument("--frames", type=int, default=900, metavar="N", help="frames to measure, at 30 Hz; default 900")
     work.add_argument(
-        "--swing", default="10deg", metavar="ANGLE", help="swing of pitch and roll to both sides; default 10deg"
-    )
-    work.add_argument("--sway", default="0.03", metavar="M", help="sway of the height up and down [m]; default 0.03")
-    work.add_argument(
         "--up-to",
         type=int,
         metavar="N",
@@ -66,9 +61,7 @@ def parser() -> argparse.ArgumentParser:
     output.add_argument(
         "--json", type=Path, metavar="FILE", help="also write all figures as JSON; - prints them instead of the table"
     )
-    output.add_argument(
-        "--tune", type=Path, metavar="FILE", help="vm.toml to read, and to write the fastest settings to"
-    )
+    output.add_argument("--tune", action="store_true", help="also print the fastest settings, for vm.toml")
     add_settings(parser)
     return parser
 
@@ -83,14 +76,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """Check all options, measure, print the figures, and tune if asked to."""
-    if options.tune is not None and options.config is None and is_file(options.tune):
-        options.config = options.tune
     given = read_options(options)
     if options.up_to is not None and options.up_to < 1:
         raise InputError(f"--up-to must be at least 1, not {options.up_to}")
     work = make_workload(options, given)
     network = model_path(given.model)
-    _check_outputs(options, given, network)
+    _check_options(options, given, network)
     model = read_model(network)
     settings = _settings_to_measure(options, given.detector)
     detectors = [Detector(model, each) for each in settings]
@@ -101,20 +92,19 @@ def _run(options: argparse.Namespace) -> int:
     found = _figures(model, work, detectors, runs)
     if not _prints_json(options):
         print(bench_table(found), flush=True)
-    if options.tune is not None:
+    if options.tune:
         bar = ProgressBar(options.frames)
         threads = max(each.threads for each in settings)
         found["tuned"] = fastest_settings(model, given.detector, threads, work, bar.show)
         bar.clear()
+        if not _prints_json(options):
+            entries = (f"{name} = {json.dumps(value)}" for name, value in found["tuned"].items())
+            print("\n[detector]", *entries, sep="\n")
     text = json.dumps(found, indent=1, allow_nan=False)
     if _prints_json(options):
         print(text)
     elif options.json is not None:
         write_file(options.json, text + "\n")
-    if options.tune is not None:
-        write_entries(options.tune, "detector", found["tuned"])
-        chosen = ", ".join(f"{name} = {json.dumps(value)}" for name, value in found["tuned"].items())
-        print(f"{options.tune}: {chosen}", file=sys.stderr if _prints_json(options) else sys.stdout)
     return EXIT_OK
 
 
@@ -122,18 +112,15 @@ def _prints_json(options: argparse.Namespace) -> bool:
     return str(options.json) == "-"
 
 
-def _check_outputs(options: argparse.Namespace, given: Configuration, network: Path) -> None:
+def _check_options(options: argparse.Namespace, given: Configuration, network: Path) -> None:
     """Raise InputError if a file can't be written or tuning can't work, before anything is measured.
 
     network: the model file.
     """
-    inputs = (options.image, options.lens, network)
     if options.json is not None and not _prints_json(options):
-        check_writable(options.json, (*inputs, options.config))
-    if options.tune is None:
+        check_writable(options.json, (options.image, options.lens, network, options.config))
+    if not options.tune:
         return
-    check_not_input(options.tune, inputs)
-    check_editable(options.tune, "detector", TUNED)
     if given.detector.height_tolerance == 0.0:
         raise InputError("--tune needs prepared meshes; give a --height-tolerance above 0")
     if options.frames < _TUNING_FRAMES:
@@ -175,8 +162,8 @@ def _figures(model: ModelFile, work: Workload, detectors: Sequence[Detector], ru
             "height_m": work.middle.height,
             "pitch_rad": work.middle.pitch,
             "roll_rad": work.middle.roll,
-            "swing_rad": work.swing,
-            "sway_m": work.sway,
+            "swing_rad": SWING,
+            "sway_m": SWAY,
         },
         "operations_per_point": operations,
         "sgemm_gflops": round(rate / 1e9, 1),

@@ -69,7 +69,7 @@ def parser() -> argparse.ArgumentParser:
         "--camera",
         metavar="SOURCE",
         help="files, each frame once: an image, a folder or glob of images, a video, or a bag of ROS 2; or a live "
-        "camera: its number or device, an http, https or rtsp address, gstreamer:PIPELINE, synthetic, or fault:SCRIPT",
+        "camera: its number or device, an http, https or rtsp address, gstreamer:PIPELINE, or synthetic",
     )
     parser.add_argument(
         "--live", action="store_true", help="play files like a live camera: at their frame rate, skipping late frames"
@@ -111,7 +111,7 @@ def parser() -> argparse.ArgumentParser:
         help="write all frames, with their detections drawn in, as one .mp4, .avi or .webm, at the rate of the video "
         "that is read, or 10 a second for images",
     )
-    output.add_argument(
+    points = output.add_argument(
         "--save-points", type=Path, metavar="DIR", help="write NAME.npz with pixels, rays and probabilities"
     )
     output.add_argument(
@@ -127,8 +127,10 @@ def parser() -> argparse.ArgumentParser:
         metavar="FILE",
         help="write images, lenses, poses, detections and states as FILE.mcap, for Foxglove and ROS 2",
     )
-    output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
+    emit = output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
     output.add_argument("--explain", action="store_true", help="add rejected proposals or clusters, with reasons")
+    parser.hide(points)
+    parser.hide(emit)
     add_settings(parser)
     add_track(parser)
     add_live(parser)
@@ -232,7 +234,7 @@ def _check_file_options(options: argparse.Namespace) -> None:
         raise InputError("--emit-points adds the points to the JSON: leave --no-json out")
     sections = _LIVE_ONLY if any(map(is_bag, options.files)) else (*_LIVE_ONLY, "pose")
     for name in (f"{section}_{each.name}" for section in sections for each in fields(LIVE[section])):
-        if getattr(options, name) is not None:
+        if getattr(options, name, None) is not None:
             raise InputError(
                 f"--{name.replace('_', '-')} works only with a live camera; --live plays files like a live camera"
             )

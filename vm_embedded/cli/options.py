@@ -31,6 +31,7 @@ from ..network.bundled import DEFAULT, SHIPPED
 from ..output.channels import OutputSettings
 from ..output.recorder import CONFIGURATION, RecorderSettings
 from ..poses.settings import PoseSettings
+from .program import Parser
 
 LIVE = {
     "camera": CameraSettings,
@@ -41,6 +42,22 @@ LIVE = {
     "ros": RosSettings,
 }
 """Sections for live cameras."""
+
+_USUAL = (
+    *("threads", "object_radius", "max_distance", "min_confidence", "track_on", "pose_source"),
+    *("output_udp", "output_unix", "status_page", "recorder_folder", "ros_image"),
+)
+"""Entries whose options --help shows; --help-all shows the others."""
+
+_FILE_ONLY = (
+    *("spinning", "pitch_step", "roll_step", "cache_mib", "max_around", "max_widths", "min_visible"),
+    *("track_center_error", "track_pixel_error", "track_pose_error", "track_height_error"),
+    *("track_wander", "track_max_speed", "track_gate", "track_forget"),
+    *("camera_exposure_ms", "camera_gain", "camera_latency_ms", "camera_frozen"),
+    *("pose_latency_ms", "pose_extrapolate_ms", "pose_max_age_ms", "pose_max_climb", "pose_max_turn"),
+    *("recorder_memory_mib", "recorder_pause", "status_budget_ms"),
+)
+"""Entries without an option: a robot sets them once, in its vm.toml."""
 
 ANGLES = "Angles are in radians, or in degrees with a suffix as in 20deg."
 
@@ -85,38 +102,41 @@ def add_pose(parser: argparse.ArgumentParser, description: str) -> None:
         pose.add_argument(f"--{name}", type=entries[name], metavar="ANGLE", help=f"{meaning} [rad]; default 0")
 
 
-def add_settings(parser: argparse.ArgumentParser, skip: Sequence[str] = ()) -> None:
-    """Add an option for each field of Settings, except those in `skip`."""
-    _add_section(parser.add_argument_group("settings"), Settings, "", skip)
+def add_settings(parser: Parser, skip: Sequence[str] = ()) -> None:
+    """Add the options of Settings, except those in `skip`."""
+    _add_section(parser, "settings", Settings, "", skip)
 
 
-def add_live(parser: argparse.ArgumentParser) -> None:
-    """Add an option for each entry of the sections for live cameras."""
+def add_live(parser: Parser) -> None:
+    """Add the options of the sections for live cameras."""
     for name, section in LIVE.items():
-        group = parser.add_argument_group(f"[{name}], for {'vm-ros and bags' if name == 'ros' else 'live cameras'}")
-        _add_section(group, section, f"{name}_", ("source",) if name == "camera" else ())
+        title = f"[{name}], for {'vm-ros and bags' if name == 'ros' else 'live cameras'}"
+        _add_section(parser, title, section, f"{name}_", ("source",) if name == "camera" else ())
 
 
-def add_track(parser: argparse.ArgumentParser) -> None:
-    """Add an option for each entry of [track]; --track switches it on."""
-    _add_section(parser.add_argument_group("[track]"), TrackSection, "track_")
+def add_track(parser: Parser) -> None:
+    """Add the option --track."""
+    _add_section(parser, "[track]", TrackSection, "track_")
 
 
-def _add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip: Sequence[str] = ()) -> None:
-    """Add an option for each entry of a section, except those in `skip`. prefix: first part of the option names."""
+def _add_section(parser: Parser, title: str, section: Any, prefix: str, skip: Sequence[str] = ()) -> None:
+    """Add options for a section's entries, except those in `skip`. prefix: first part of the option names."""
+    group = parser.add_argument_group(title)
     for each in fields(section):
-        if each.name in skip:
+        if each.name in skip or prefix + each.name in _FILE_ONLY:
             continue
         unit = f" [{each.metadata['unit']}]" if each.metadata["unit"] else ""
         help = f"{each.metadata['help']}{unit}{_default(each)}".replace("%", "%%")
         name = prefix + each.name
         option = "--" + name.removesuffix("_on").replace("_", "-")
         if isinstance(each.default, bool):
-            group.add_argument(option, dest=name, action=argparse.BooleanOptionalAction, default=None, help=help)
+            added: argparse.Action = group.add_argument(
+                option, dest=name, action=argparse.BooleanOptionalAction, default=None, help=help
+            )
         else:
             allowed = each.metadata.get("allowed")
             kind = "TEXT" if isinstance(each.default, str) else "N" if isinstance(each.default, int) else "X"
-            group.add_argument(
+            added = group.add_argument(
                 option,
                 dest=name,
                 type=partial(_read, each),
@@ -124,6 +144,8 @@ def _add_section(group: argparse._ArgumentGroup, section: Any, prefix: str, skip
                 metavar=None if allowed else kind,
                 help=help,
             )
+        if name not in _USUAL:
+            parser.hide(added)
 
 
 def _read(entry: Field[Any], text: str) -> Any:

@@ -7,8 +7,8 @@ import errno
 import os
 import re
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from functools import wraps
 from importlib import metadata
@@ -53,6 +53,7 @@ class Parser(argparse.ArgumentParser):
         self.color = False  # Python 3.14 would print control sequences, which terminal.py escapes
         self._given: Sequence[str] = ()
         self._commands = commands
+        self._rare: list[argparse.Action] = []
         self.add_argument("--version", action="version", version=version(self.prog), help="show the version and exit")
         if " " not in self.prog:
             self.add_argument(
@@ -61,6 +62,37 @@ class Parser(argparse.ArgumentParser):
                 nargs=0,
                 help='bash completion: eval "$(vm-detect --completion)"',
             )
+
+    def hide(self, option: argparse.Action) -> None:
+        """Leave an option out of --help. --help-all, which this adds, shows it."""
+        if not self._rare:
+            self.add_argument("--help-all", action=PrintAllHelp, nargs=0, help="show the rarely used options, too")
+        self._rare.append(option)
+
+    def format_usage(self) -> str:
+        """As argparse does, without hidden options."""
+        with self._only_usual():
+            return super().format_usage()
+
+    def format_help(self) -> str:
+        """As argparse does, without hidden options."""
+        with self._only_usual():
+            return super().format_help()
+
+    def format_all_help(self) -> str:
+        """The text of --help-all."""
+        return super().format_help()
+
+    @contextmanager
+    def _only_usual(self) -> Iterator[None]:
+        helps = [each.help for each in self._rare]
+        for each in self._rare:
+            each.help = argparse.SUPPRESS
+        try:
+            yield
+        finally:
+            for each, help in zip(self._rare, helps, strict=True):
+                each.help = help
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse does; it remembers the arguments for an error message."""
@@ -153,6 +185,16 @@ def _number(text: str) -> float:
 def is_completing() -> bool:
     """Whether the shell asks for completions, instead of a user for a result."""
     return _COMPLETING in os.environ
+
+
+class PrintAllHelp(argparse.Action):
+    """The option --help-all."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any, **__: Any) -> None:
+        """Print the help with all options, and exit."""
+        assert isinstance(parser, Parser)
+        print(parser.format_all_help(), end="")
+        parser.exit()
 
 
 class PrintCompletion(argparse.Action):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Image
 from ..cameras.image_files import check_read_format, read_image
-from ..config.units import parse_angle, parse_length, parse_size
+from ..config.units import parse_size
 from ..detection.pixel_formats import checked_image
 from ..errors import InputError
 from ..geometry.lens import Lens, Size
@@ -22,6 +22,9 @@ from ..live.configuration import Configuration
 _SIZE, _HEIGHT, _PITCH = (1280, 1024), 0.6, 0.4
 """Image size [px], height [m] and pitch [rad] of the camera where the user gives none."""
 
+SWING, SWAY = math.radians(10.0), 0.03
+"""How far a walk moves the camera: pitch and roll to both sides [rad], and the height up and down [m]."""
+
 _FRAME_RATE, _STRIDE_RATE, _STEPS_PER_STRIDE = 30.0, 0.97, 2.02
 """Frames and strides per second, and steps per stride. The odd values keep the walk from repeating itself."""
 
@@ -30,14 +33,12 @@ _FRAME_RATE, _STRIDE_RATE, _STEPS_PER_STRIDE = 30.0, 0.97, 2.02
 class Workload:
     """One image, seen through a lens from each orientation of a walk.
 
-    middle: the orientation around which the walk swings. swing: of pitch and roll [rad]. sway: of the height [m].
+    middle: the orientation around which the walk swings.
     """
 
     image: Image
     lens: Lens
     middle: Orientation
-    swing: float
-    sway: float
     orientations: list[Orientation]
 
     @property
@@ -48,28 +49,27 @@ class Workload:
 
 def make_workload(options: argparse.Namespace, given: Configuration) -> Workload:
     """The workload that the options of vm-bench describe. Raises InputError."""
-    swing, sway = parse_angle(options.swing, "--swing"), parse_length(options.sway, "--sway")
     if options.frames < 1:
         raise InputError(f"--frames must be at least 1, not {options.frames}")
     middle = given.fixed_orientation() or Orientation.from_roll_pitch(_HEIGHT, 0.0, _PITCH)
-    if abs(sway) >= middle.height:
-        raise InputError(f"--sway {sway:g} m moves a camera at {middle.height:g} m below the plane; give a smaller one")
+    if middle.height <= SWAY:
+        raise InputError(f"the walk moves a camera at {middle.height:g} m below the plane; give a larger --height")
     image, lens = _image_and_lens(options, given)
-    return Workload(image, lens, middle, swing, sway, walk(middle, swing, sway, options.frames))
+    return Workload(image, lens, middle, walk(middle, options.frames))
 
 
-def walk(middle: Orientation, swing: float, sway: float, frames: int) -> list[Orientation]:
+def walk(middle: Orientation, frames: int) -> list[Orientation]:
     """Orientations of the camera of a walking robot, 30 per second.
 
-    The roll swings by `swing` [rad] to both sides about once per second, and the pitch about twice. The height sways
-    by `sway` [m] about twice per second. The frequencies differ, so no two frames are the same.
+    The roll swings by SWING to both sides about once per second, and the pitch about twice. The height sways by SWAY
+    about twice per second. The frequencies differ, so no two frames are the same.
     """
     phases = 2.0 * np.pi * _STRIDE_RATE / _FRAME_RATE * np.arange(frames)
     return [
         Orientation.from_roll_pitch(
-            middle.height + sway * math.sin(_STEPS_PER_STRIDE * phase),
-            middle.roll + swing * math.sin(phase),
-            middle.pitch + swing * math.cos(_STEPS_PER_STRIDE * phase),
+            middle.height + SWAY * math.sin(_STEPS_PER_STRIDE * phase),
+            middle.roll + SWING * math.sin(phase),
+            middle.pitch + SWING * math.cos(_STEPS_PER_STRIDE * phase),
         )
         for phase in phases.tolist()
     ]

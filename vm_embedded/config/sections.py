@@ -24,17 +24,16 @@ def read_sections(
     kind: type[Configuration],
     path: Path | None,
     overrides: Mapping[str, Mapping[str, Any]] | None = None,
-    noun: str = "configuration",
     defaults: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> Configuration:
     """Read a configuration, a dataclass of sections, from a TOML file; without a file, use all defaults.
 
-    overrides: entries by section that replace those of the file. noun: the kind of file, for messages. defaults:
-    entries by section that replace the defaults; a section with a `read` of its own is taken whole. Raises InputError
-    naming the file, line, section and entry, and the allowed values.
+    overrides: entries by section that replace those of the file. defaults: entries by section that replace
+    the defaults; a section with a `read` of its own is taken whole. Raises InputError naming the file, line, section
+    and entry, and the allowed values.
     """
-    text = read_text(path, noun) if path else ""
-    where = f"{noun} {path}" if path else noun
+    text = read_text(path, "configuration") if path else ""
+    where = f"configuration {path}" if path else "configuration"
     try:
         table = parse_toml(text)
     except InputError as error:

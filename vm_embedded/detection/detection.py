@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 from ..arrays import Floats
+from ..borders.records import SHARE, SIZE, Record, Sent
 from .track import Track
 
 
 @dataclass(frozen=True, eq=False)
-class Detection:
+class Detection(Record):
     """One object on the observation plane, or, with a `reason`, a rejected candidate.
 
     The coordinates are in the plane's frame. Its origin is on the plane below the camera, and z points up. This is the
@@ -26,48 +27,27 @@ class Detection:
     close look saw; without one, from the size that fits the points best. distance_by_angle [m]: distance that follows
     from `angular_radius` and the real radius. distances_agree: whether the apparent size is near the size expected at
     `distance`, within 20 % with a close look, otherwise within one ring spacing of the mesh. points: number of mesh
-    points inside its outline. reason: why it was rejected, or None. track: of the object over several frames, if a
-    Tracker follows it.
+    points inside its outline. reason: why a candidate was rejected; an object has none. track: the object over several
+    frames, if a Tracker follows it.
     """
 
-    class_name: str
-    confidence: float
-    center: Floats
-    radius: float
+    class_name: Annotated[str, Sent(name="class")]
+    confidence: Annotated[float, SHARE]
+    center: Annotated[Floats, Sent(1, (2,))]
+    radius: Annotated[float, Sent(1, least=0)]
     outline: Floats
-    bearing: Floats
-    position: Floats
-    distance: float
-    angular_radius: float
-    distance_by_angle: float
-    distances_agree: bool
-    points: int
-    reason: str | None = None
-    track: Track | None = None
+    bearing: Annotated[Floats, Sent(5, (3,))]
+    position: Annotated[Floats, Sent(3, (3,))]
+    distance: Annotated[float, SIZE]
+    angular_radius: Annotated[float, Sent(5, least=0)]
+    distance_by_angle: Annotated[float, SIZE]
+    distances_agree: Annotated[bool, Sent()]
+    points: Annotated[int, SIZE]
+    reason: Annotated[str | None, Sent()] = None
+    track: Annotated[Track | None, Sent()] = None
 
     def __repr__(self) -> str:
         x, y, z = self.position
         reason = "" if self.reason is None else f" rejected: {self.reason}"
         place = f"{self.distance:.2f} m at ({x:.2f}, {y:.2f}, {z:.2f})"
         return f"<{self.class_name} {self.confidence:.2f} {place}{reason}>"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON: pixels to 0.1, meters to 0.001."""
-        data: dict[str, Any] = {
-            "class": self.class_name,
-            "confidence": round(self.confidence, 3),
-            "center": [round(float(value), 1) for value in self.center],
-            "radius": round(self.radius, 1),
-            "bearing": [round(float(value), 5) for value in self.bearing],
-            "position": [round(float(value), 3) for value in self.position],
-            "distance": round(self.distance, 3),
-            "angular_radius": round(self.angular_radius, 5),
-            "distance_by_angle": round(self.distance_by_angle, 3),
-            "distances_agree": self.distances_agree,
-            "points": self.points,
-        }
-        if self.reason is not None:
-            data["reason"] = self.reason
-        if self.track is not None:
-            data["track"] = self.track.as_dict()
-        return data

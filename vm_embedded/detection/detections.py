@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, overload
+from typing import Annotated, Any, overload
 
 import cv2
 import numpy as np
 
 from ..arrays import AnyImage, Floats, Image, Singles, one_number
+from ..borders.records import SIZE, Record, Sent
 from ..errors import InputError, one_line, unknown
 from ..field.features import FieldFeatures
 from ..files import write_file
@@ -23,13 +24,16 @@ from .observation import Observation
 from .overlay import draw_overlay
 from .table import to_csv, to_row
 
+STAGES = ("mesh", "project", "sample", "infer", "propose", "look", "cluster", "field", "track", "total")
+"""Parts of the work on a frame; its time has an entry for each that was needed, and `total`."""
+
 _PICTURES = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff")
 _ENCODING = dict.fromkeys((".jpg", ".jpeg"), (cv2.IMWRITE_JPEG_QUALITY, 92))
 """Parameters of OpenCV by suffix; other formats know no quality of JPEG."""
 
 
 @dataclass(frozen=True, eq=False)
-class ClassPoints:
+class ClassPoints(Record):
     """The m points of a class.
 
     class_name: name of the class. bearings (m, 3): unit vectors from the camera, in the plane's frame. pixels (m, 2)
@@ -37,12 +41,26 @@ class ClassPoints:
     """
 
     class_name: str
-    bearings: Floats
+    bearings: Annotated[Floats, Sent(4, (-1, 3))]
     pixels: Floats
-    probabilities: Singles
+    probabilities: Annotated[Singles, Sent(3, (-1,), least=0, most=1)]
 
     def __len__(self) -> int:
         return len(self.bearings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Results(Record):
+    """What messages have of a frame.
+
+    points: number of mesh points on screen. detections: the objects, most confident first. field: features of the
+    field; only with a network that knows them. timing_ms [ms]: time of each stage and of the whole call.
+    """
+
+    points: Annotated[int, SIZE]
+    detections: Annotated[tuple[Detection, ...], Sent()]
+    field: Annotated[FieldFeatures | None, Sent()] = None
+    timing_ms: Annotated[Mapping[str, float], Sent(least=0, allowed=STAGES)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,14 +104,7 @@ class Detections:
 
         Without field features, the key `field` is missing.
         """
-        data: dict[str, Any] = {
-            "points": len(self.pixels),
-            "detections": [each.as_dict() for each in self],
-        }
-        if self.field is not None:
-            data["field"] = self.field.as_dict()
-        data["timing_ms"] = {stage: round(value, 3) for stage, value in self.timing_ms.items()}
-        return data
+        return results(self).as_dict()
 
     def filter(
         self,
@@ -230,6 +241,11 @@ class Detections:
         column = self.probabilities[:, self.manifest.column(class_name)]
         chosen = np.flatnonzero(column > self.threshold)
         return ClassPoints(class_name, self.rays[chosen], self.pixels[chosen], column[chosen])
+
+
+def results(found: Detections) -> Results:
+    """What messages have of these detections."""
+    return Results(points=len(found.pixels), detections=found.objects, field=found.field, timing_ms=found.timing_ms)
 
 
 def edges_in_image(outline: Floats, size: tuple[int, int]) -> Floats:

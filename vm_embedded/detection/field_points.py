@@ -45,19 +45,24 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
 def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
     view, classes = observation.view, observation.manifest.classes
-    steep = np.flatnonzero(observation.rays[:, 2] < -_LOWEST)
-    steep = steep[np.argsort(observation.rays[steep, 2], kind="stable")]  # the mesh is nearly in this order
-    rays = observation.rays[steep]
-    probabilities = np.nan_to_num(observation.probabilities[steep])  # one NaN would spoil the sums of all others
-    outside = np.zeros(len(steep), np.float32)
-    for column, each in enumerate(classes):
-        if each.kind == "background":
-            outside += probabilities[:, column]
+    rays = observation.layout.rays.T
+    upward = rays[2, observation.shown]
+    order = np.argsort(upward, kind="stable")  # the mesh is nearly in this order
+    order = order[: np.searchsorted(upward, -_LOWEST, sorter=order)]
+    slots, scale = observation.shown[order], -view.height / upward[order]
+    positions = np.array([rays[0, slots] * scale, rays[1, slots] * scale])
+    columns = [  # 0 for NaN: one NaN would spoil the sums of all others
+        (each, np.fmax(column[slots], 0.0))
+        for each, column in zip(classes, observation.slot_probabilities.T, strict=True)
+        if each.kind == "background" or each.name in ROLES
+    ]
     return GroundPoints(
-        positions=rays[:, :2] * (-view.height / rays[:, 2:]),
+        positions=(view.heading[:2, :2] @ positions).T,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
-        classes={each.name: probabilities[:, number] for number, each in enumerate(classes) if each.name in ROLES},
-        outside=outside,
+        classes={each.name: column for each, column in columns if each.name in ROLES},
+        outside=sum(
+            (column for each, column in columns if each.kind == "background"), np.zeros(len(slots), np.float32)
+        ),
         ahead=view.heading[:2, 0],
     )

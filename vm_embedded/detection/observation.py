@@ -52,7 +52,7 @@ class Observation:
     timing_ms: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        return len(self._shown)
+        return len(self.shown)
 
     @property
     def layout(self) -> Layout:
@@ -65,7 +65,7 @@ class Observation:
         return self.slot_answers[:, : len(self.manifest.classes)]
 
     @cached_property
-    def _shown(self) -> Indices:
+    def shown(self) -> Indices:
         """Slots (n,) of the points on screen, in the order of the mesh."""
         places = self.layout.places
         return places[self.projected.on_screen[places]]
@@ -73,17 +73,17 @@ class Observation:
     @cached_property
     def pixels(self) -> Floats:
         """Pixels (n, 2) of the points."""
-        return self.projected.pixels[self._shown]
+        return self.projected.pixels[self.shown]
 
     @cached_property
     def rays(self) -> Floats:
         """Unit vectors (n, 3) from the camera to the points, in the plane's frame, as in Detection."""
-        return np.asarray(self.layout.rays[self._shown] @ self.view.heading.T)
+        return np.asarray(self.layout.rays[self.shown] @ self.view.heading.T)
 
     @cached_property
     def probabilities(self) -> Singles:
         """Probabilities (n, C) of the points, in the order of the manifest's classes."""
-        return self.slot_probabilities[self._shown]
+        return self.slot_probabilities[self.shown]
 
     @cached_property
     def peaks(self) -> Mapping[str, Peaks]:

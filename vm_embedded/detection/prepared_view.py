@@ -50,13 +50,17 @@ class PreparedView(NamedTuple):
 
     def ray_pixels(self, rays: Floats) -> Floats:
         """Pixels (n, 2) of rays (n, 3) in the mesh frame; NaN where the lens sees nothing."""
-        camera = to_camera(rays, self.rotation)
-        return np.where(self.lens.sees(camera)[:, None], self.lens.project(camera, self.size), np.nan)
+        return self._pixels(to_camera(rays, self.rotation))
 
     def plane_pixels(self, places: Floats) -> Floats:
         """Pixels (n, 2) of places (n, 2) [m] on the plane, from below the camera; NaN where the lens sees nothing."""
-        toward = np.column_stack([places, np.full(len(places), -self.height)]) @ self.heading
-        return self.ray_pixels(toward / np.linalg.norm(toward, axis=1, keepdims=True))
+        x, y = places.T
+        rays = np.array([x, y, np.full(len(places), -self.height)]) / np.sqrt(x * x + y * y + self.height**2)
+        return self._pixels(((self.heading @ self.rotation).T @ rays).T)
+
+    def _pixels(self, camera: Floats) -> Floats:
+        """Pixels (n, 2) of rays (n, 3) in the camera frame; NaN where the lens sees nothing."""
+        return np.where(self.lens.sees(camera)[:, None], self.lens.project(camera, self.size), np.nan)
 
     def in_picture(self, pixels: Floats) -> Mask:
         """Which pixels (n, 2) are inside the picture; NaN is not."""

@@ -22,19 +22,22 @@ def brightness_along(view: PreparedView, pyramid: Pyramid, stretches: Floats, co
     view: of the frame. pyramid: the frame; only its first level is read. The lens projects both ends and the middle of
     each stretch; a parabola through them gives the other places.
     """
-    nodes = np.stack([stretches[:, 0], stretches.mean(axis=1), stretches[:, 1]], axis=1)  # (n, 3, 2)
-    known = view.plane_pixels(nodes.reshape(-1, 2)).reshape(-1, 3, 2)
-    pixels = np.matmul(_shares(count), known)  # (n, count, 2)
-    seen = view.in_picture(pixels.reshape(-1, 2)).reshape(pixels.shape[:2])
-    x, y = np.where(seen[:, :, None], pixels, -1.0).astype(np.float32).transpose(2, 0, 1)
+    nodes = np.concatenate([stretches[:, 0], 0.5 * (stretches[:, 0] + stretches[:, 1]), stretches[:, 1]])
+    known = view.plane_pixels(nodes).T.reshape(2, 3, -1)  # x and y of the nodes
+    x, y = pixels = known.transpose(0, 2, 1).astype(np.float32) @ _shares(count).T  # (2, n, count)
+    width, height = view.size
+    hidden = ~((x >= 0.0) & (x <= width - 1.0) & (y >= 0.0) & (y <= height - 1.0))
+    pixels[:, hidden] = -1.0
     colors = cv2.remap(pyramid.level(0), x, y, cv2.INTER_LINEAR)
     gray = colors if colors.ndim == 2 else cv2.transform(colors, _MEAN[:, : colors.shape[2]])
-    steps = np.hypot(*(known[:, 2] - known[:, 0]).T) / (count - 1)
-    return np.where(seen, gray, np.nan).astype(np.float32), np.nan_to_num(steps)
+    brightness = gray.astype(np.float32)
+    brightness[hidden] = np.nan
+    along = known[:, 2] - known[:, 0]
+    return brightness, np.nan_to_num(np.hypot(along[0], along[1]) / (count - 1))
 
 
 @lru_cache(maxsize=4)
-def _shares(count: int) -> Floats:
+def _shares(count: int) -> Singles:
     """Shares (count, 3) of the two ends and the middle between them in evenly spaced places."""
-    at = np.linspace(0.0, 1.0, count)
+    at = np.linspace(0.0, 1.0, count, dtype=np.float32)
     return np.stack([(1.0 - at) * (1.0 - 2.0 * at), 4.0 * at * (1.0 - at), at * (2.0 * at - 1.0)], axis=1)

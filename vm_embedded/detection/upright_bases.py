@@ -48,7 +48,7 @@ def find_uprights(
     for center, width, pixel, each in zip(centers, widths, pixels, judged, strict=True):
         distance = float(np.linalg.norm(center))
         found.append(
-            Upright(UPRIGHTS[class_name], center[:2], distance, center / distance, pixel, width, each.confidence)
+            Upright(UPRIGHTS[class_name], each.confidence, center[:2], distance, center / distance, pixel, width)
         )
     return apart(found)
 

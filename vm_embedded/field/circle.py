@@ -1,21 +1,25 @@
 """The center circle among the line points that are on no long straight line.
 
-Circles through three points near each other are tried (Fischler and Bolles, "Random sample consensus", 1981), always
-with the same seed. The one with the most points on it is fitted to them, if they cover enough of it.
+Circles through three of the points are tried (Fischler and Bolles, "Random sample consensus", 1981), always the same
+ones. The one with the most points on it is fitted to them, if they cover enough of it.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Chosen, Floats, Mask
-from .ground_points import cross
+from ..arrays import Chosen, Floats
 from .lines import LinePoints
 
-_TRIES = 60
+_TRIES = 300
 """Number of circles that are tried."""
+
+_SHARES = np.outer(np.arange(1, _TRIES + 1), np.sqrt([2.0, 3.0, 5.0])) % 1.0
+"""The three points of each circle, as shares of the number of points: multiples of an irrational number are spread
+evenly."""
 
 _MOST_VOTERS = 100
 """Largest number of points that suggest circles and vote for them."""
@@ -23,7 +27,7 @@ _MOST_VOTERS = 100
 _RADII = (0.35, 1.7)
 """Smallest and largest radius of a center circle [m]: children's fields to those of large robots."""
 
-_FEWEST = 12
+_FEWEST = 18
 """A circle has at least so many points."""
 
 _SECTORS = 24
@@ -59,97 +63,72 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
     """
     if len(free) < _FEWEST:
         return None
-    voters = points.part(free[:: -(-len(free) // _MOST_VOTERS)])
-    centers, radii = _through(voters.positions[_triples(voters)])
+    searched = points.part(free)
+    best = _best_circle(searched.part(slice(None, None, -(-len(free) // _MOST_VOTERS))))
+    if best is None:
+        return None
+    center, radius = best
+    for _ in range(2):
+        normals, off, reach = _around(searched, center, radius)
+        on = np.abs(off) < reach
+        if np.count_nonzero(on) < _FEWEST:
+            return None
+        # One step of Gauss and Newton towards the least squares of distances, weighted by precision.
+        precision = np.sqrt(searched.weights * on) / reach
+        slopes = np.array([*normals, np.ones(len(off))]) * precision
+        step = np.linalg.lstsq(slopes @ slopes.T, slopes @ (off * precision), rcond=None)[0]
+        center, radius = center + step[:2], radius + float(step[2])
+    return _checked(points, free, center, radius)
+
+
+def _best_circle(points: LinePoints) -> tuple[Floats, float] | None:
+    """Center (2,) [m] and radius [m] of the circle through three points that most of them are on."""
+    centers, radii = _through(points.positions[(_SHARES * len(points)).astype(np.intp)])
     possible = (radii > _RADII[0]) & (radii < _RADII[1])
     if not possible.any():
         return None
     centers, radii = centers[possible], radii[possible]
-    off = np.sqrt(_squares(voters.positions, centers)) - radii
-    support = voters.weights @ (np.abs(off) < _tolerance(voters)[:, None])
-    around = voters.weights @ (np.abs(off) < 0.5 * radii)
-    best = int(np.argmax(2.0 * support - around))
-    center, radius = centers[best], float(radii[best])
-    part = points.part(free)
-    for _ in range(2):
-        on = _on(part, center, radius)
-        if on.sum() < _FEWEST:
-            return None
-        center, radius = _fit(part.part(on), center, radius)
-    return _checked(points, free, center, radius)
-
-
-def _triples(points: LinePoints) -> Chosen:
-    """Numbers (t, 3) of points that may be on one circle: each is near the first of its triple."""
-    random = np.random.default_rng(0)
-    first = random.integers(len(points), size=_TRIES)
-    squares = _squares(points.positions[first], points.positions)
-    near = squares < (2.0 * _RADII[1]) ** 2
-    shares = np.cumsum(near, axis=1)
-    chosen = np.ceil(random.random((_TRIES, 2)) * shares[:, -1:])
-    others = [(shares < chosen[:, [column]]).sum(axis=1) for column in (0, 1)]
-    return np.column_stack([first, *others])
-
-
-def _squares(positions: Floats, others: Floats) -> Floats:
-    """Squares (n, m) of the distances between places (n, 2) and (m, 2)."""
-    x, y = (positions[:, None, axis] - others[:, axis] for axis in (0, 1))
-    return x**2 + y**2
-
-
-def _tolerance(points: LinePoints) -> Floats:
-    """How far (n,) [m] points may be from the circle's middle line."""
-    return 0.04 + 0.6 * points.blur
-
-
-def _on(points: LinePoints, center: Floats, radius: float) -> Mask:
-    """Which points (n,) are on a circle."""
-    lengths, normals = _from_center(points, center)
-    return np.asarray(np.abs(lengths - radius) < points.tolerance(normals))
-
-
-def _from_center(points: LinePoints, center: Floats) -> tuple[Floats, Floats]:
-    """Distances (n,) [m] of points from a center, and unit vectors (n, 2) from it to them."""
-    away = points.positions - center
-    lengths = np.hypot(away[:, 0], away[:, 1])
-    return lengths, away / np.maximum(lengths, 1e-9)[:, None]
+    x, y = points.positions.T.astype(np.float32)[:, :, None] - centers.T.astype(np.float32)[:, None]  # (n, t)
+    off = np.abs(np.sqrt(x * x + y * y) - radii.astype(np.float32))
+    tolerance = 0.04 + 0.6 * points.blur
+    best = int(np.argmax(points.weights @ (2.0 * (off < tolerance[:, None]) - (off < 0.5 * radii))))
+    return centers[best], float(radii[best])
 
 
 def _through(triples: Floats) -> tuple[Floats, Floats]:
-    """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); infinite for points in a row."""
+    """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); NaN for points in a row."""
     a, b = triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0]
-    area = 2.0 * cross(a, b)
+    area = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
     area[np.abs(area) < 1e-6] = np.nan
     aa, bb = (a**2).sum(axis=1), (b**2).sum(axis=1)
     x = (b[:, 1] * aa - a[:, 1] * bb) / area
     y = (a[:, 0] * bb - b[:, 0] * aa) / area
-    return triples[:, 0] + np.stack([x, y], axis=1), np.nan_to_num(np.hypot(x, y), nan=np.inf)
+    return triples[:, 0] + np.array([x, y]).T, np.hypot(x, y)
 
 
-def _fit(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, float]:
-    """One step of Gauss and Newton towards the circle with the least squares of distances, weighted by precision."""
-    lengths, normals = _from_center(points, center)
-    precision = np.sqrt(points.weights) / points.tolerance(normals)
-    slopes = np.column_stack([normals, np.ones(len(lengths))]) * precision[:, None]
-    step = np.linalg.lstsq(slopes, (lengths - radius) * precision, rcond=None)[0]
-    return center + step[:2], radius + float(step[2])
+def _around(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, Floats, Floats]:
+    """Unit vectors (2, n) from the center of a circle to points, how far they are outside of it (n,) [m], and how far
+    they may be (n,) [m]."""
+    places = points.positions.T
+    away = places - center[:, None]
+    lengths = np.maximum(np.hypot(*away), 1e-9)
+    away /= lengths
+    return away, lengths - radius, points.tolerance((places * away).sum(axis=0))
 
 
 def _checked(points: LinePoints, free: Chosen, center: Floats, radius: float) -> CirclePoints | None:
     """The circle with all its points, or None if it is too small, too large, or too little of it is seen."""
-    members = np.flatnonzero(_on(points, center, radius))
+    (x, y), off, reach = _around(points, center, radius)
+    on = np.abs(off) < reach
+    members = np.flatnonzero(on)
     if not _RADII[0] < radius < _RADII[1] or len(members) < _FEWEST:
         return None
-    away = points.positions - center
-    angles = np.arctan2(away[members, 1], away[members, 0])
-    sectors = np.bincount(
-        ((angles + np.pi) * (_SECTORS / (2.0 * np.pi))).astype(np.intp) % _SECTORS, minlength=_SECTORS
-    )
-    arc = float((sectors > 0).mean())
-    around = np.abs(np.hypot(away[:, 0], away[:, 1]) - radius) < _AROUND * radius
+    sectors = np.floor(np.arctan2(y[on], x[on]) * (0.5 * _SECTORS / math.pi)).astype(np.intp) % _SECTORS
+    arc = np.count_nonzero(np.bincount(sectors)) / _SECTORS
     weights = points.weights
-    total = float(weights[members].sum())
-    own = float(weights[np.intersect1d(members, free)].sum())
-    if arc < _LEAST_ARC or total < _LEAST_PURE * float(weights[around].sum()) or own < _LEAST_OWN * total:
+    total = float(weights[on].sum())
+    around = float(weights[np.abs(off) < _AROUND * radius].sum())
+    own = float(weights[free[on[free]]].sum())
+    if arc < _LEAST_ARC or total < _LEAST_PURE * around or own < _LEAST_OWN * total:
         return None
     return CirclePoints(center, radius, arc, members)

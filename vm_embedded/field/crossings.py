@@ -1,14 +1,21 @@
-"""Crossings: where two straight lines meet at a right angle, and in which shape."""
+"""Crossings: where two straight lines meet at a right angle, and in which shape.
+
+Places and directions on the plane are complex numbers here: of conj(a) b, the real part is the scalar product of a and
+b, and the imaginary part is their cross product.
+"""
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Callable, Sequence
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Floats, Mask
 from .features import Crossing, Segment
-from .ground_points import cross
 
 _MARGIN = 0.25
 """A line that goes on by less than this behind a crossing [m] ends there."""
@@ -29,90 +36,81 @@ Shown = Callable[[Floats], Mask]
 """Which places (n, 2) [m] on the plane the frame shows."""
 
 
+class _Line(NamedTuple):
+    """A straight piece of a line: its start [m], its direction of length 1, its length [m] and its confidence."""
+
+    start: complex
+    way: complex
+    length: float
+    confidence: float
+
+    def arms(self, t: float, beyond: float) -> list[complex]:
+        """The directions in which it goes on from a place at t [m] along it, by more than `beyond` [m]."""
+        return [way for way, rest in ((self.way, self.length - t), (-self.way, t)) if rest > beyond]
+
+
 def find_crossings(lines: Sequence[Segment], shown: Shown) -> tuple[Crossing, ...]:
     """Crossings of all pairs of lines. There is none where its kind is not clear: where the frame ends behind
     the end of a line, or where lines of several pieces meet."""
-    if len(lines) < 2:
-        return ()
-    ends, confidences = _without_duplicates(lines)
-    starts = ends[:, 0]
-    lengths, ways = _lengths_and_ways(ends)
-    sine = cross(ways[:, None], ways)
-    sine[np.abs(sine) < _LEAST_SINE] = np.nan
-    along = cross(starts - starts[:, None], ways) / sine  # (n, n): where line i meets line j, [m] from its start
-    places = starts[:, None] + along[..., None] * ways[:, None]
-    larger = _LARGER * np.hypot(places[..., 0], places[..., 1])
-    near = _MISSING + larger
-    gaps = np.maximum(-along, along - lengths[:, None]) / near  # of line i in front of line j
-    meets = gaps < 1.0
-    pairs = np.argwhere(np.triu(meets & meets.T, 1))
-    found, behind = [], []  # behind: two places that the frame must show to be sure that a line ends
-    for i, j in pairs:
-        beyond = _MARGIN + larger[i, j]
-        arms = [_arms(along[i, j], lengths[i], ways[i], beyond), _arms(along[j, i], lengths[j], ways[j], beyond)]
-        if all(arms):
-            gap = max(gaps[i, j], gaps[j, i], 0.0)
-            found.append((places[i, j], arms, float(confidences[i] * confidences[j] * (1.0 - _GAP_COST * gap))))
-            behind.append([places[i, j] - (own[0] * beyond if len(own) == 1 else 0.0) for own in arms])
+    found = [each for pair in combinations(_without_duplicates(lines), 2) for each in _crossing(*pair)]
     if not found:
         return ()
-    complete: Mask = np.all(shown(np.array(behind).reshape(-1, 2)).reshape(-1, 2), axis=1)
-    crossings = [_described(*each) for each, whole in zip(found, complete, strict=True) if whole]
+    behind = np.array([each for _, each in found]).ravel()
+    complete = np.all(shown(np.array([behind.real, behind.imag]).T).reshape(-1, 2), axis=1).tolist()
+    crossings = [each for (each, _), whole in zip(found, complete, strict=True) if whole]
     return tuple(each for each in crossings if _is_alone(each, crossings))
 
 
-def _without_duplicates(lines: Sequence[Segment]) -> tuple[Floats, Floats]:
-    """Ends (n, 2, 2) [m] and confidences (n,) of the lines, longest first.
+def _without_duplicates(segments: Sequence[Segment]) -> list[_Line]:
+    """The lines, longest first.
 
     A line that was found twice, as two lines beside each other, is one: the longer, with the ends of both.
     """
-    ordered = sorted(lines, key=lambda each: -each.length)
-    ends, confidences = np.array([each.ends for each in ordered]), np.array([each.confidence for each in ordered])
-    lengths, ways = _lengths_and_ways(ends)
-    middles = ends.mean(axis=1)
-    relative = ends - ends[:, None, None, 0]  # (n, n, 2, 2): ends of line j from the start of line i
-    along = np.einsum("ijek,ik->ije", relative, ways)
-    overlaps = (along.max(axis=2) > 0.0) & (along.min(axis=2) < lengths[:, None])
-    off = np.abs(cross(ways[:, None], middles - ends[:, None, 0]))
-    beside = off < _MARGIN + 0.5 * _LARGER * np.hypot(*middles.T)
-    again = np.triu((np.abs(ways @ ways.T) > _LEAST_SINE) & overlaps & beside, 1)
-    kept = np.ones(len(lines), dtype=bool)
-    for i, j in np.argwhere(again):
-        if kept[i] and kept[j]:
-            kept[j] = False
-            reach = (ends[i] - ends[i, 0]) @ ways[i], along[i, j]
-            low, high = np.min(reach), np.max(reach)
-            ends[i] = ends[i, 0] + np.outer([low, high], ways[i])
-            along[i] -= low  # from the new start
-    return ends[kept], confidences[kept]
+    kept: list[_Line] = []
+    for each in sorted(segments, key=lambda each: -each.length):
+        start, end = (complex(*place) for place in each.ends.tolist())
+        length = abs(end - start)
+        line = _Line(start, (end - start) / length, length, each.confidence)
+        for number, longer in enumerate(kept):
+            # Both ends, as seen from the start of the longer one: the real part is along it.
+            ends = [(place - longer.start) * longer.way.conjugate() for place in (start, end)]
+            low, high = sorted(place.real for place in ends)
+            is_parallel = high - low > _LEAST_SINE * length
+            is_beside = abs(sum(ends).imag) < 2.0 * _MARGIN + 0.5 * _LARGER * abs(start + end)
+            if is_parallel and is_beside and high > 0.0 and low < longer.length:
+                low, high = min(low, 0.0), max(high, longer.length)
+                kept[number] = longer._replace(start=longer.start + low * longer.way, length=high - low)
+                break
+        else:
+            kept.append(line)
+    return kept
 
 
-def _lengths_and_ways(ends: Floats) -> tuple[Floats, Floats]:
-    """Lengths (n,) [m] and directions (n, 2) of straight pieces with these ends (n, 2, 2) [m]."""
-    steps = ends[:, 1] - ends[:, 0]
-    lengths = np.hypot(*steps.T)
-    return lengths, steps / lengths[:, None]
+def _crossing(one: _Line, other: _Line) -> list[tuple[Crossing, tuple[complex, complex]]]:
+    """The crossing of two lines, if there is one, and two places that the frame must show to be sure that they end."""
+    sine = (one.way.conjugate() * other.way).imag
+    if abs(sine) < _LEAST_SINE:
+        return []
+    between = (other.start - one.start).conjugate()
+    t, u = (between * other.way).imag / sine, (between * one.way).imag / sine  # [m] along both
+    place = one.start + t * one.way
+    beyond, missing = (each + _LARGER * abs(place) for each in (_MARGIN, _MISSING))
+    gap = max(-t, t - one.length, -u, u - other.length, 0.0) / missing  # of a line in front of the other
+    arms = sorted([one.arms(t, beyond), other.arms(u, beyond)], key=len)
+    if gap >= 1.0 or not arms[0]:
+        return []
+    kind = {2: "L", 3: "T", 4: "X"}[len(arms[0]) + len(arms[1])]
+    heading = cmath.phase(arms[0][0] + arms[1][0] if kind == "L" else arms[0][0])
+    crossing = Crossing(
+        kind,
+        np.array([place.real, place.imag]),
+        heading % (0.5 * math.pi) if kind == "X" else heading,
+        one.confidence * other.confidence * (1.0 - _GAP_COST * gap),
+    )
+    first, second = (place - own[0] * beyond if len(own) == 1 else place for own in arms)
+    return [(crossing, (first, second))]
 
 
 def _is_alone(crossing: Crossing, others: Sequence[Crossing]) -> bool:
     """Whether no other crossing is at the same place. Of a line in two pieces, each makes one, and none is right."""
-    near = [np.hypot(*(each.position - crossing.position)) < 2.0 * _MARGIN for each in others]
-    return bool(sum(near) == 1)
-
-
-def _arms(t: float, length: float, way: Floats, beyond: float) -> list[Floats]:
-    """The directions in which a line goes on from a crossing at t [m] along it, by more than `beyond` [m]."""
-    return [sign * way for sign, rest in ((1.0, length - t), (-1.0, t)) if rest > beyond]
-
-
-def _described(place: Floats, arms: list[list[Floats]], confidence: float) -> Crossing:
-    counts = [len(each) for each in arms]
-    if counts == [2, 2]:
-        return Crossing("X", place, _angle(arms[0][0]) % (0.5 * np.pi), confidence)
-    if counts == [1, 1]:
-        return Crossing("L", place, _angle(arms[0][0] + arms[1][0]), confidence)
-    return Crossing("T", place, _angle(arms[counts.index(1)][0]), confidence)
-
-
-def _angle(direction: Floats) -> float:
-    return float(np.arctan2(direction[1], direction[0]))
+    return sum(math.dist(each.position, crossing.position) < 2.0 * _MARGIN for each in others) == 1

@@ -12,7 +12,7 @@ from .circle import CirclePoints, find_circle
 from .crossings import find_crossings
 from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
 from .goals import pair_posts
-from .ground_points import GroundPoints
+from .ground_points import GroundPoints, starts_of_runs
 from .lines import LEAST, LinePoints, Piece, find_pieces, line_points
 from .ridges import Profiles, pieces_on_ridges
 
@@ -41,14 +41,14 @@ def find_features(
     profiles: brightness of the frame across lines. posts, robots: what stands on the plane.
     """
     near = line_points(points)
-    likely = near.part(near.weights > LEAST)
+    likely = near.part(np.flatnonzero(near.weights > LEAST))
     pieces, circle = _straight_and_round(near, likely)
     pieces = pieces_on_ridges(pieces, points, profiles)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
     ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
     end_pixels, border_pixels = np.split(to_pixels(np.concatenate([ends, border])), [len(ends)])  # faster at once
     lines = tuple(
-        Segment(piece.ends, pixels, float(likely.weights[piece.members].mean()))
+        Segment(piece.ends, pixels, float(likely.weights[piece.members].sum()) / len(piece.members))
         for piece, pixels in zip(pieces, end_pixels.reshape(-1, 2, 2), strict=True)
     )
     thinned, confidences = _thinned(likely)
@@ -89,7 +89,9 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     """Mean places (p, 2) [m] and probabilities (p,) of the line points in each square."""
     if not len(points):
         return np.empty((0, 2)), np.empty(0, np.float32)
-    cells = np.floor(points.positions / _CELL).astype(np.int64)
-    _, number, count = np.unique(cells[:, 0] * (1 << 20) + cells[:, 1], return_inverse=True, return_counts=True)
-    sums = [np.bincount(number, each) / count for each in (*points.positions.T, points.weights)]
-    return np.stack(sums[:2], axis=1), sums[2].astype(np.float32)
+    cells = np.floor(points.positions * (1.0 / _CELL)) @ (1024.0, 1.0)  # points of a square have the same number
+    order = np.argsort(cells)
+    starts = starts_of_runs(cells[order])
+    columns = np.array([*points.positions.T, points.weights])[:, order]
+    x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
+    return np.array([x, y]).T, weights.astype(np.float32)

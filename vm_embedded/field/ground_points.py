@@ -36,40 +36,26 @@ class GroundPoints:
     @cached_property
     def ranges(self) -> Floats:
         """Distance (n,) [m] on the plane from the point below the camera."""
-        return np.hypot(self.positions[:, 0], self.positions[:, 1])
+        x, y = self.positions.T
+        return np.asarray(np.sqrt(x * x + y * y))
 
     @cached_property
     def azimuths(self) -> Floats:
         """Direction (n,) [rad] on the plane, counterclockwise from `ahead`: -pi and pi are behind the camera."""
         x, y = self.ahead
-        return np.asarray(np.arctan2(self.positions @ (-y, x), self.positions @ self.ahead))
+        ahead, left = np.array([[x, y], [-y, x]]) @ self.positions.T
+        return np.asarray(np.arctan2(left.astype(np.float32), ahead.astype(np.float32)), dtype=np.float64)
 
     def directions(self, azimuths: Floats) -> Floats:
         """Unit vectors (m, 2) at azimuths (m,) [rad]."""
         (x, y), c, s = self.ahead, np.cos(azimuths), np.sin(azimuths)
-        return np.stack([c * x - s * y, c * y + s * x], axis=-1)
+        return np.array([c * x - s * y, c * y + s * x]).T
 
     def along(self, ranges: Floats) -> Floats:
         """Distance [m] to the next ring of points, along the ray, at these ranges [m]."""
-        return np.asarray(self.across * np.hypot(ranges, self.height) / self.height)
+        return np.asarray(np.sqrt(ranges**2 + self.height**2) * (self.across / self.height))
 
 
-def cross(a: Floats, b: Floats) -> Floats:
-    """Cross product (...,) of vectors (..., 2) on the plane: positive if b is to the left of a."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
-def split(columns: npt.NDArray[np.integer[Any]], values: Floats) -> tuple[Chosen, Floats]:
-    """For each column of points, sorted from near to far, the place that best parts positive from negative values.
-
-    columns (n,): number of each point's column, sorted. values (n,). Returns for each column that occurs the position
-    of the last point before the best split, or -1 if all values are better behind it, and the sum of the values there.
-    For one column with the values 1, 1, -1, -1 these are 1 and 2.
-    """
-    starts = np.flatnonzero(np.diff(columns, prepend=-1))
-    counts = np.diff(np.append(starts, len(values)))
-    sums = np.cumsum(values)
-    sums = sums - np.repeat(sums[starts] - values[starts], counts)
-    best = np.maximum.reduceat(sums, starts)
-    last = np.maximum.reduceat(np.where(sums == np.repeat(best, counts), np.arange(len(values)), -1), starts)
-    return np.where(best > 0.0, last, -1), best
+def starts_of_runs(numbers: npt.NDArray[np.number[Any]]) -> Chosen:
+    """Positions in numbers (n,), at least one, where runs of equal numbers start."""
+    return np.flatnonzero(np.concatenate([[True], numbers[1:] != numbers[:-1]]))

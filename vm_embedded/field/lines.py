@@ -2,7 +2,6 @@
 
 All lines of a field are parallel or at right angles, except for its circle. A Hough transform of the line points finds
 the two directions. Lines in these directions are taken one after the other, best first, and fitted to their points.
-Each fitted line makes the two directions more certain.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask, Singles
-from .ground_points import GroundPoints
+from .ground_points import GroundPoints, starts_of_runs
 
 LEAST = 0.1
 """Points with a smaller probability of the class line suggest no line."""
@@ -30,8 +29,11 @@ _MOST_VOTERS = 200
 _BIN = 0.06
 """Width of a bin of the Hough transform [m], at the camera; it grows with the distance of the line."""
 
-_MOST_ROUNDS = 14
-"""Largest number of searches for a line, which may have several pieces."""
+_STEP = 0.01
+"""Distances of lines are rounded to this [m] to look up their bins."""
+
+_MOST_LINES = 14
+"""Largest number of lines, which may have several pieces."""
 
 _SHORTEST = 0.2
 """Shorter pieces [m] are no lines."""
@@ -54,17 +56,12 @@ _MOST_AGAINST = 2.0
 _TURN = 0.15
 """A fitted line turns by less than this [rad] from the expected direction."""
 
-_FIRST_ERROR = 0.015
-"""Standard deviation [rad] of the direction that the Hough transform finds."""
-
-_SKEW = 0.01
-"""Standard deviation [rad] of the direction of one line: fields are painted, and poses are measured, with errors."""
+_ERROR = 0.014
+"""Standard deviation [rad] of a line from the direction that the Hough transform finds: fields are painted, and poses
+are measured, with errors."""
 
 _NOISE = 0.5
 """Standard deviation of a point's distance from its line, as a share of its tolerance."""
-
-_SAME_DIRECTION = 0.004
-"""A turn of the two directions [rad] that does not yet need new bins."""
 
 
 def tolerance(outward: Floats, blur: Floats, across: float) -> Floats:
@@ -78,28 +75,28 @@ def tolerance(outward: Floats, blur: Floats, across: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class LinePoints:
-    """n points near enough for lines. positions (n, 2) [m]. weights (n,): their probabilities. radial (n, 2): unit
-    vectors away from the camera. blur (n,) [m]: half the distance between rings of the mesh there. across [m]: half
-    the distance between points of a ring."""
+    """n points near enough for lines. positions (n, 2) [m]. weights (n,): their probabilities. ranges (n,) [m]: from
+    below the camera. blur (n,) [m]: half the distance between rings of the mesh there. across [m]: half the distance
+    between points of a ring."""
 
     positions: Floats
     weights: Singles
-    radial: Floats
+    ranges: Floats
     blur: Floats
     across: float
 
     def __len__(self) -> int:
-        return len(self.positions)
+        return len(self.ranges)
 
-    def tolerance(self, normals: Floats) -> Floats:
-        """How far (n,) [m] a point may be from a line's middle, across unit vectors (2,) or (n, 2)."""
-        outward = self.radial @ normals if normals.ndim == 1 else np.einsum("ij,ij->i", self.radial, normals)
-        return tolerance(np.abs(outward), self.blur, self.across)
+    def tolerance(self, offsets: Floats) -> Floats:
+        """How far (..., n) [m] a point may be from a line's middle. offsets (..., n) [m]: how far the points are from
+        the camera along the line's normal."""
+        return tolerance(np.abs(offsets) / self.ranges, self.blur, self.across)
 
-    def part(self, chosen: Mask | Chosen) -> LinePoints:
+    def part(self, chosen: Chosen | slice) -> LinePoints:
         """Some of the points."""
         return LinePoints(
-            self.positions[chosen], self.weights[chosen], self.radial[chosen], self.blur[chosen], self.across
+            self.positions[chosen], self.weights[chosen], self.ranges[chosen], self.blur[chosen], self.across
         )
 
 
@@ -115,20 +112,17 @@ class Piece:
     @property
     def length(self) -> float:
         """Distance between the ends [m]."""
-        return float(np.hypot(*(self.ends[1] - self.ends[0])))
+        return math.dist(*self.ends.tolist())
 
 
 def line_points(points: GroundPoints) -> LinePoints:
     """All points near enough for lines, with the probability 0 if the network has no class line."""
+    first, last = np.searchsorted(points.ranges, (1e-3, _FARTHEST))
+    near = slice(int(first), int(last))
+    ranges = points.ranges[near]
     probabilities = points.classes.get("line", np.zeros(len(points.ranges), np.float32))
-    chosen = np.flatnonzero((points.ranges < _FARTHEST) & (points.ranges > 1e-3))
-    ranges, positions = points.ranges[chosen], points.positions[chosen]
     return LinePoints(
-        positions,
-        probabilities[chosen],
-        positions / ranges[:, None],
-        0.5 * points.along(ranges),
-        0.5 * points.across,
+        points.positions[near], probabilities[near], ranges, 0.5 * points.along(ranges), 0.5 * points.across
     )
 
 
@@ -139,102 +133,97 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
     """
     if len(likely) < _FEWEST:
         return []
-    angle, certainty = _main_direction(likely), 1.0 / _FIRST_ERROR**2
-    binned, bins = angle, _bins(likely, angle)
-    # A line turns little from these normals, so how far its points may be changes little, too.
-    normals = _normals(angle)
-    reaches = [[each.tolerance(normal) for normal in normals] for each in (points, likely)]
-    moments = _moments(likely.positions)
-    free = np.ones(len(likely), dtype=bool)
-    weights = likely.weights.astype(np.float64)  # 0 where not free
-    pieces: list[Piece] = []
-    for _ in range(_MOST_ROUNDS):
-        votes = [np.bincount(each, weights, minlength=_COUNT) for each in bins]
-        sums = [each[:-1] + each[1:] for each in votes]  # a line may fall between two bins
-        axis = int(sums[1].max() > sums[0].max())
-        peak = int(np.argmax(sums[axis]))
-        if sums[axis][peak] < _LEAST_VOTES:
-            break
-        near = free & ((bins[axis] == peak) | (bins[axis] == peak + 1))
-        line = _fit(moments, weights, reaches[1][axis], near, free, _normals(angle)[axis], _SKEW**2 + 1.0 / certainty)
-        found = _cut(points, reaches[0][axis], likely, line)
-        pieces += found
-        free[line.members] = False
-        free[near] = False
-        weights[~free] = 0.0
-        if found:
-            weight = 1.0 / (_SKEW**2 + 1.0 / max(line.certainty, 1e-9))
-            certainty += weight
-            angle += line.turn * weight / certainty
-            if abs(angle - binned) > _SAME_DIRECTION:
-                binned, bins = angle, _bins(likely, angle)
+    normals = _normals(np.array([_main_direction(likely)]))
+    lines = _find_lines(likely, normals)
+    pieces = _cut(points, normals, lines) if lines else []
     return sorted(pieces, key=lambda each: -each.length)
 
 
-def _normals(angle: float) -> Floats:
-    """Normals (2, 2) of lines in both directions of a field, the first one at this angle [rad]."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, s], [-s, c]])
+def _normals(angles: Floats) -> Floats:
+    """Normals (2 a, 2) of lines in both directions of a field: at these angles (a,) [rad], then across."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.array([[c, s], [-s, c]]).transpose(0, 2, 1).reshape(-1, 2)
 
 
-_REACH = np.arcsinh(_FARTHEST)
-_COUNT = 2 * int(np.ceil(_REACH / _BIN)) + 2
+_CENTER = round(_FARTHEST / _STEP)
+_REACH = np.arcsinh(np.arange(-_CENTER, _CENTER + 1) * _STEP)
+_BINS = np.floor((_REACH - _REACH[0]) / _BIN).astype(np.intp) + 1  # bin 0 is empty: it divides the rows
+_COUNT = int(_BINS[-1]) + 1
+_TRIED = np.arange(_ANGLES, dtype=np.float64) * (0.5 * math.pi / _ANGLES)
+_NORMALS = _normals(_TRIED).astype(np.float32)
 
 
-def _bins(points: LinePoints, angle: float) -> Chosen:
-    """Bins (2, n) of the lines through n points in both directions of a field, whose first normal is at an angle
-    [rad]."""
-    return _bins_at(_normals(angle) @ points.positions.T)
-
-
-def _bins_at(offsets: Floats) -> Chosen:
-    """Bins of lines at these distances [m] from the camera: finer for near lines."""
-    return np.asarray(np.floor((np.arcsinh(offsets) + _REACH) / _BIN), dtype=np.intp)
+def _bins(offsets: Floats | Singles) -> Chosen:
+    """Bins (r, n) of lines at these distances (r, n) [m] from the camera: finer for near lines. Each row has its
+    own bins."""
+    steps = (offsets * (1.0 / _STEP) + (_CENTER + 0.5)).astype(np.intp)
+    return np.asarray(_BINS[steps] + _COUNT * np.arange(len(offsets))[:, None])
 
 
 def _main_direction(points: LinePoints) -> float:
     """The direction [rad], from 0 to a right angle, in which most points share a line, or at a right angle to it."""
-    some = points.part(np.arange(0, len(points), -(-len(points) // _MOST_VOTERS)))
-    angles = np.arange(_ANGLES) * (0.5 * np.pi / _ANGLES)
-    normals = np.concatenate([[np.cos(angles), np.sin(angles)], [-np.sin(angles), np.cos(angles)]], axis=1)  # (2, 2A)
-    bins = _bins_at(some.positions @ normals) + _COUNT * np.arange(2 * _ANGLES)
-    weights = np.broadcast_to(some.weights[:, None], bins.shape)
-    votes = np.bincount(bins.ravel(), weights.ravel(), minlength=2 * _ANGLES * _COUNT).reshape(2, _ANGLES, _COUNT)
-    return float(angles[np.argmax((votes**2).sum(axis=(0, 2)))])
+    some = points.part(slice(None, None, -(-len(points) // _MOST_VOTERS)))
+    bins = _bins(_NORMALS @ some.positions.T.astype(np.float32))
+    votes = np.bincount(bins.ravel(), np.tile(some.weights, len(bins)), len(bins) * _COUNT)
+    peaks = (votes.reshape(2, _ANGLES, _COUNT) ** 2).sum(axis=(0, 2))
+    best = int(np.argmax(peaks))
+    before, most, after = peaks[[best - 1, best, (best + 1) % _ANGLES]].tolist()
+    shift = 0.5 * (after - before) / max(2.0 * most - before - after, 1e-9)  # of the parabola through the three
+    return float(_TRIED[best] + shift * _TRIED[1])
 
 
 @dataclass(frozen=True, eq=False)
 class _Line:
-    """A fitted line: a point of it (2,) [m], its direction (2,), and the numbers of its likely points. turn [rad]: from
-    the expected direction to the one of the points alone. certainty: one over the variance of this direction."""
+    """A fitted line: the number of its normal, a point [m], its direction, and the numbers of its likely points."""
 
-    middle: Floats
-    direction: Floats
+    axis: int
+    middle: tuple[float, float]
+    direction: tuple[float, float]
     members: Chosen
-    turn: float
-    certainty: float
 
 
-def _moments(positions: Floats) -> Floats:
-    """1, x, y, x^2, x y and y^2 (6, n) of n places (n, 2)."""
-    x, y = positions.T
-    return np.stack([np.ones(len(x)), x, y, x * x, x * y, y * y])
+def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
+    """Lines across two normals (2, 2), each fitted to likely points that no line before has."""
+    offsets = normals @ points.positions.T
+    bins, reach = _bins(offsets), points.tolerance(offsets)
+    moments = np.ones((6, len(points)))  # 1, x, y, x^2, x y and y^2
+    moments[1:3] = points.positions.T
+    moments[3:5], moments[5] = moments[1] * moments[1:3], moments[2] ** 2
+    weights = np.array([points.weights, points.weights], dtype=np.float64)  # 0 where not free
+    precision = weights / reach**2
+    lines: list[_Line] = []
+    for _ in range(_MOST_LINES):
+        votes = np.bincount(bins.ravel(), weights.ravel(), 2 * _COUNT)
+        votes[:-1] += votes[1:]  # a line may fall between two bins
+        peak = int(np.argmax(votes))
+        if votes[peak] < _LEAST_VOTES:
+            break
+        axis = peak // _COUNT
+        near = (bins[axis] == peak) | (bins[axis] == peak + 1)
+        middle, direction, on = _fit(moments, precision[axis], reach[axis], near, normals[axis])
+        members = np.flatnonzero(on & (weights[0] > 0.0))
+        if len(members) >= _FEWEST:
+            lines.append(_Line(axis, middle, direction, members))
+        left = ~(on | near)
+        weights *= left
+        precision *= left
+    return lines
 
 
 def _fit(
-    moments: Floats, weights: Floats, reach: Floats, near: Mask, free: Mask, normal: Floats, variance: float
-) -> _Line:
-    """A line through free points with moments (6, n) and weights (n,).
+    moments: Floats, precision: Floats, reach: Floats, near: Mask, normal: Floats
+) -> tuple[tuple[float, float], tuple[float, float], Mask]:
+    """A point [m] of a line through points with moments (6, n) and precision (n,), its direction, and which points
+    (n,) are on it.
 
     reach (n,): how far a point may be from the line [m]. near (n,): the points to begin with. normal (2,): the expected
-    normal, whose direction has this variance [rad^2].
+    normal.
     """
-    _, x, y = moments[:3]
-    ex, ey = -float(normal[1]), float(normal[0])  # the expected direction
-    precise = moments * (weights / reach**2)
-    members = near
-    for _ in range(3):
-        total, sx, sy, sxx, sxy, syy = (precise * members).sum(axis=1).tolist()
+    ex, ey, on = -float(normal[1]), float(normal[0]), near  # the expected direction
+    for _ in range(2):
+        total, sx, sy, sxx, sxy, syy = (moments @ (precision * on)).tolist()
+        if total <= 0.0:
+            break
         mx, my = sx / total, sy / total
         xx, xy, yy = sxx - sx * mx, sxy - sx * my, syy - sy * my
         angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # of the longer axis
@@ -242,64 +231,73 @@ def _fit(
         if abs(turn) > _TURN:
             turn = 0.0  # its points are a blob, or belong to a line at a right angle
         certainty = max(ex * ex * xx + 2.0 * ex * ey * xy + ey * ey * yy, 0.0) / _NOISE**2
-        kept = turn * certainty / (certainty + 1.0 / variance)
+        kept = turn * certainty / (certainty + 1.0 / _ERROR**2)
         c, s = math.cos(kept), math.sin(kept)
         dx, dy = c * ex - s * ey, s * ex + c * ey
-        off = x * dy
-        off -= y * dx
-        off -= mx * dy - my * dx
-        members = np.abs(off, out=off) < reach
-        members &= free
-        if np.count_nonzero(members) < 2:
-            break
-    return _Line(np.array([mx, my]), np.array([dx, dy]), np.flatnonzero(members), turn, certainty)
+        on = np.abs(np.array([my * dx - mx * dy, dy, -dx]) @ moments[:3]) < reach
+    return (mx, my), (dx, dy), on
 
 
-def _cut(points: LinePoints, reach: Floats, likely: LinePoints, line: _Line) -> list[Piece]:
-    """The pieces of a line that its points speak for. reach (n,): how far each of the points may be from it [m]."""
-    if len(line.members) < _FEWEST:
-        return []
-    normal = np.array([line.direction[1], -line.direction[0]])
-    off = np.abs(points.positions @ normal - line.middle @ normal)
-    on = np.flatnonzero(off < reach)
-    t = (points.positions[on] - line.middle) @ line.direction
-    order = np.argsort(t)
-    t, values = t[order], points.weights[on[order]].astype(np.float64) - _EXPECTED
-    along = (likely.positions[line.members] - line.middle) @ line.direction
-    pieces = []
-    for first, last, support in _best_stretches(values, _LEAST_SUPPORT, _MOST_AGAINST):
-        members = line.members[(along >= t[first]) & (along <= t[last])]
-        if t[last] - t[first] >= _SHORTEST and len(members) > 1:
-            ends = line.middle + np.outer([t[first], t[last]], line.direction)
-            pieces.append(Piece(ends, members, support))
-    return pieces
+def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]:
+    """The pieces of lines that their points speak for."""
+    middles, directions = np.array([each.middle for each in lines]), np.array([each.direction for each in lines])
+    across = directions[:, ::-1] * (1.0, -1.0)
+    distances = (across * middles).sum(axis=1, keepdims=True)
+    reach = points.tolerance(normals @ points.positions.T)[[each.axis for each in lines]]
+    places = points.positions.T.astype(np.float32)
+    off = across.astype(np.float32) @ places
+    off -= distances.astype(np.float32)
+    on = np.flatnonzero(np.abs(off, out=off) < reach)
+    along = (directions.astype(np.float32) @ places).ravel()[on]  # [m] from the place next to the camera
+    line = on // len(points)
+    order = np.argsort(along + 4.0 * _FARTHEST * line)
+    line, along = line[order], along[order]
+    point = on[order] - len(points) * line
+    likely = np.flatnonzero(points.weights > LEAST)
+    owner = np.full(len(points), -1)
+    for number, each in enumerate(lines):
+        owner[likely[each.members]] = number
+    own = np.flatnonzero(owner[point] == line)
+    members = np.searchsorted(likely, point[own])
+    values = points.weights[point].astype(np.float64) - _EXPECTED
+    stretches = _best_stretches(values, line, _LEAST_SUPPORT, _MOST_AGAINST)
+    spans = np.array([each[:2] for each in stretches], dtype=np.intp).reshape(-1, 2)
+    feet = across * distances
+    ends = feet[line[spans]] + along[spans][..., None] * directions[line[spans]]
+    bounds = np.searchsorted(own, spans + np.array([0, 1])).tolist()
+    pieces = (
+        Piece(its_ends, members[first:end], support)
+        for its_ends, (first, end), (_, _, support) in zip(ends, bounds, stretches, strict=True)
+    )
+    return [each for each in pieces if each.length >= _SHORTEST and len(each.members) > 1]
 
 
-def _best_stretches(values: Floats, least: float, lost: float) -> list[tuple[int, int, float]]:
-    """First and last position and sum of stretches of the values (n,): the stretch with the largest sum, and those of
-    what is left on its two sides, as long as a sum is at least `least`.
+def _best_stretches(values: Floats, groups: Chosen, least: float, lost: float) -> list[tuple[int, int, float]]:
+    """First and last position and sum of stretches of the values (n,): in each group the stretch with the largest sum,
+    and those of what is left on its two sides, as long as a sum is at least `least`.
 
-    lost: negative values in a row with a sum below -lost are in no stretch.
+    groups (n,): number of each value's group, ascending from 0. lost: negative values in a row with a sum below -lost
+    are in no stretch. Ruzzo and Tompa, "A linear time algorithm for finding all maximal scoring subsequences", 1999.
     """
     if not len(values):
         return []
-    found = []
-    starts = np.flatnonzero(np.diff(values < 0.0, prepend=values[0] >= 0.0))  # of runs with the same sign
-    ends = np.append(starts[1:], len(values))
-    gaps = np.add.reduceat(values, starts) < -lost
-    rest = list(zip(np.append(0, ends[gaps]).tolist(), np.append(starts[gaps], len(values)).tolist(), strict=True))
-    gains = np.concatenate([[0.0], np.cumsum(np.maximum(values, 0.0))])
-    while rest:
-        start, end = rest.pop()
-        if gains[end] - gains[start] < least:
+    starts = starts_of_runs(2 * groups + (values < 0.0))
+    sums, ends = np.add.reduceat(values, starts), [*starts[1:].tolist(), len(values)]
+    found: list[tuple[int, int, float, float]] = []  # positions; sums of all values before and up to the end
+    total, group, base = 0.0, -1, 0  # stretches before `base` are complete
+    for first, end, gain, of in zip(starts.tolist(), ends, sums.tolist(), groups[starts].tolist(), strict=True):
+        if of != group or gain < -lost:
+            group, base = of, len(found)
+        low, total = total, total + gain
+        if gain <= 0.0:
             continue
-        sums = np.concatenate([[0.0], np.cumsum(values[start:end])])
-        lowest = np.minimum.accumulate(sums)
-        last = int(np.argmax(sums - lowest))
-        best = float(sums[last] - lowest[last])
-        if best < least:
-            continue
-        first = int(np.flatnonzero(sums[: last + 1] == lowest[last])[-1])
-        found.append((start + first, start + last - 1, best))
-        rest += [(start, start + first), (start + last, end)]
-    return found
+        number = len(found)
+        while number > base:
+            number -= 1
+            if found[number][2] < low:
+                if found[number][3] >= total:
+                    break
+                first, _, low, _ = found[number]
+                del found[number:]
+        found.append((first, end - 1, low, total))
+    return [(first, last, high - low) for first, last, low, high in found if high - low >= least]

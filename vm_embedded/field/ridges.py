@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Chosen, Floats, Mask, Singles
+from ..arrays import Floats, Singles
 from .ground_points import GroundPoints
 from .lines import Piece, tolerance
 
@@ -23,7 +23,11 @@ the plane, NaN outside of the picture, and the pixels (n,) between two of these 
 _STATIONS = 12
 """Profiles of a piece."""
 
-_HALF = 20
+_AT = (np.arange(_STATIONS) + 0.5) / _STATIONS
+_SHARES = np.stack([1.0 - _AT, _AT], axis=1)
+"""Shares (T, 2) of the two ends of a piece in the place of each profile."""
+
+_HALF = 16
 """Samples of a profile on each side of the piece."""
 
 _MARGIN = 0.12
@@ -31,6 +35,9 @@ _MARGIN = 0.12
 
 _SHIFTS = 7
 """Places that are tried for each end of a piece."""
+
+_TRIED = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, _SHIFTS)], indexing="ij"), axis=-1).reshape(-1, 2)
+"""Pairs (S, 2) of these places, as shares of how far the ridge may be from the ends."""
 
 _TURN = 0.06
 """A piece turns by at most this much [rad]."""
@@ -67,26 +74,25 @@ def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Pr
     """
     if not pieces:
         return []
-    ends = np.stack([each.ends for each in pieces])  # (p, 2, 2)
+    ends = np.array([each.ends for each in pieces])  # (p, 2, 2)
     along = ends[:, 1] - ends[:, 0]
     lengths = np.hypot(along[:, 0], along[:, 1])
-    normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / lengths[:, None]
+    normals = along[:, ::-1] * (-1.0, 1.0) / lengths[:, None]
     free = _free_reach(ends, normals, points)
     reach = free + _MARGIN
-    at = (np.arange(_STATIONS) + 0.5) / _STATIONS
-    weights = np.stack([1.0 - at, at])  # (2, T): of the two ends
-    middles = np.einsum("et,pex->ptx", weights, ends)
-    spans = reach @ weights  # (p, T): half the lengths of the profiles
-    aside = spans[:, :, None] * normals[:, None]  # (p, T, 2)
-    stretches = np.stack([middles - aside, middles + aside], axis=2).reshape(-1, 2, 2)
-    brightness, pixels = profiles(stretches, 2 * _HALF + 1)
-    steps = spans.mean(axis=1) / _HALF  # (p,) [m]
-    widths = np.maximum(_WIDTH / steps, _BLUR / np.maximum(np.median(pixels.reshape(-1, _STATIONS), axis=1), 1e-6))
-    contrasts = _contrasts(brightness.reshape(len(pieces), _STATIONS, -1), widths)
-    shifts, shares = _best_shifts(contrasts, free, spans, weights, lengths)
+    aside = reach[:, :, None] * normals[:, None]
+    corners = np.concatenate([ends - aside, ends + aside], axis=2)  # (p, 2, 4)
+    brightness, pixels = profiles((_SHARES @ corners).reshape(-1, 2, 2), 2 * _HALF + 1)
+    steps = reach.sum(axis=1) / (2 * _HALF)  # (p,) [m]
+    middle = np.sort(pixels.reshape(-1, _STATIONS), axis=1)[:, _STATIONS // 2]
+    contrasts = _contrasts(
+        brightness.reshape(-1, _STATIONS, 2 * _HALF + 1).transpose(0, 2, 1),
+        np.maximum(_WIDTH / steps, _BLUR / np.maximum(middle, 1e-6)),
+    )
+    shifts, shares = _best_shifts(contrasts, free, lengths)
     return [
         replace(piece, ends=piece.ends + np.outer(shift, normal))
-        for piece, shift, normal, share in zip(pieces, shifts, normals, shares, strict=True)
+        for piece, shift, normal, share in zip(pieces, shifts, normals, shares.tolist(), strict=True)
         if share + _SUPPORT_WORTH * min(piece.support, _MOST_SUPPORT) > _LEAST
     ]
 
@@ -98,50 +104,44 @@ def _free_reach(ends: Floats, normals: Floats, points: GroundPoints) -> Floats:
     return tolerance(outward, 0.5 * points.along(ranges), 0.5 * points.across)
 
 
-def _contrasts(brightness: Singles, widths: Floats) -> Floats:
-    """Contrast (p, T, N) of a ridge at each sample of the profiles (p, T, N) to the brighter one of its sides.
+def _contrasts(brightness: Singles, widths: Floats) -> Singles:
+    """Contrast (p, N, T) of a ridge at each sample of the profiles (p, N, T) to the brighter one of its sides.
 
     widths (p,): of the ridge, in samples. NaN, and a sample whose sides are not in the profile, has the contrast 0.
     """
-    count = brightness.shape[2]
-    width = np.clip(np.rint(widths), 1, _HALF // 4).astype(np.intp)[:, None]
+    count = brightness.shape[1]
+    width = np.clip(np.rint(widths), 1, _HALF // 4).astype(np.intp)
     half = width // 2
-    known = np.nan_to_num(brightness).astype(np.float64)
-    sums = np.pad(np.cumsum(known, axis=2), ((0, 0), (0, 0), (1, 0)))
+    hidden = np.isnan(brightness)
+    sums = np.zeros((len(widths), count + 1, brightness.shape[2]), np.float32)
+    np.cumsum(np.where(hidden, np.float32(0.0), brightness), axis=1, out=sums[:, 1:])
     samples = np.arange(count)
-
-    def means(low: Chosen, high: Chosen) -> Floats:
-        """Means of the samples from `low` to `high` (p, 1), both included, around each sample."""
-        first, last = (np.clip(samples + each, 0, count) for each in (low, high + 1))
-        parts = [np.take_along_axis(sums, each[:, None], axis=2) for each in (first, last)]
-        return np.asarray((parts[1] - parts[0]) / np.maximum(last - first, 1)[:, None])
-
-    left, right = means(-half - 2 * width - 1, -half - width), means(half + width, half + 2 * width + 1)
-    ridge = means(-half, half) - np.maximum(left, right)
-    inside = (samples >= width + half) & (samples < count - width - half)
-    seen: Mask = ~np.isnan(brightness) & inside[:, None]
-    surroundings = known.mean(axis=(1, 2)) + _DARK
-    return np.where(seen, np.clip(ridge / surroundings[:, None, None], *_LIMITS), 0.0)
+    # First sample, and the one behind the last, of the left side, the ridge and the right side around each sample.
+    edges = np.array([-half - 2 * width - 1, -half - width + 1, -half, half + 1, half + width, half + 2 * width + 2])
+    at = np.clip(edges[:, :, None] + samples, 0, count)  # (6, p, N)
+    parts = sums[np.arange(len(widths))[:, None], at]  # (6, p, N, T)
+    sizes = np.maximum(at[1::2] - at[::2], 1).astype(np.float32)
+    left, ridge, right = (parts[1::2] - parts[::2]) / sizes[..., None]
+    surroundings = sums[:, -1].sum(axis=1) / (count * brightness.shape[2]) + _DARK
+    contrasts = (ridge - np.maximum(left, right)) / surroundings[:, None, None]
+    contrasts[hidden | (np.abs(samples - _HALF) > _HALF - (width + half)[:, None])[..., None]] = 0.0
+    return np.asarray(np.clip(contrasts, *_LIMITS))
 
 
-def _best_shifts(
-    contrasts: Floats, free: Floats, spans: Floats, weights: Floats, lengths: Floats
-) -> tuple[Floats, Floats]:
+def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Floats, Floats]:
     """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, and the share of stations (p,) with
     a ridge there.
 
-    contrasts (p, T, N): see _contrasts. free (p, 2) [m]: how far the ridge may be from the ends. spans (p, T) [m]: half
-    the lengths of the profiles. weights (2, T): of the ends at each station. lengths (p,) [m]: of the pieces.
+    contrasts (p, N, T): see _contrasts. free (p, 2) [m]: how far the ridge may be from the ends. lengths (p,) [m]: of
+    the pieces.
     """
-    tried = np.linspace(-1.0, 1.0, _SHIFTS)
-    pairs = np.stack(np.meshgrid(tried, tried, indexing="ij"), axis=-1).reshape(-1, 2)  # (S, 2)
-    shifts = pairs * free[:, None]  # (p, S, 2)
-    offsets = (shifts @ weights) / spans[:, None]  # (p, S, T)
-    samples = np.rint(offsets * _HALF).astype(np.intp) + _HALF
-    rows = np.arange(len(contrasts))
-    means = contrasts[rows[:, None, None], np.arange(_STATIONS), samples].mean(axis=2)
-    means[np.abs(shifts[:, :, 1] - shifts[:, :, 0]) > _TURN * lengths[:, None]] = -1.0
-    best = np.argmax(means, axis=1)
-    near = samples[rows, best][:, :, None] + np.arange(-1, 2)  # the ridge may weave by a sample
-    shown = np.take_along_axis(contrasts, np.clip(near, 0, 2 * _HALF), axis=2).max(axis=2)
-    return shifts[rows, best], (shown > _CONTRAST).mean(axis=1)
+    shifts = _TRIED * free[:, None]  # (p, S, 2)
+    spans = (free + _MARGIN) @ (_SHARES.T / _HALF)  # (p, T): of a sample
+    samples = np.rint((shifts @ _SHARES.T) / spans[:, None]).astype(np.intp) + _HALF  # (p, S, T)
+    rows, stations = np.arange(len(free)), np.arange(_STATIONS)
+    totals = contrasts[rows[:, None, None], samples, stations].sum(axis=2)
+    totals[np.abs(shifts[:, :, 1] - shifts[:, :, 0]) > _TURN * lengths[:, None]] = -np.inf
+    best = np.argmax(totals, axis=1)
+    near = samples[rows, best][:, None] + np.array([[-1], [0], [1]])  # (p, 3, T): the ridge may weave by a sample
+    shown = contrasts[rows[:, None, None], np.clip(near, 0, 2 * _HALF), stations].max(axis=1)
+    return shifts[rows, best], np.count_nonzero(shown > _CONTRAST, axis=1) / _STATIONS

@@ -133,7 +133,7 @@ class Answerer:
             return fixed
         poses, arrived = self._poses.poses, self._poses.arrived
         deadline = time.monotonic() + 1e-3 * settings.wait_ms
-        while settings.interpolate and poses.newest < shot.captured:
+        while poses.newest < shot.captured:
             left = deadline - time.monotonic()
             if left <= 0.0:
                 break

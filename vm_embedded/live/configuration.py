@@ -109,7 +109,6 @@ class StatusSettings:
         "ms",
         (0, 10000),
     )
-    picture_fps: float = number(10.0, "frame rate of the status page", "1/s", (0.1, 100))
 
     def __post_init__(self) -> None:
         check_entries(self)

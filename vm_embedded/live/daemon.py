@@ -26,7 +26,7 @@ from ..cameras.open_camera import Opener
 from ..detection.detector import Detector
 from ..errors import InputError, NetworkError, VisualMeshError, one_line
 from ..output.channels import Channels
-from ..output.messages import Message, live_message, state_message
+from ..output.messages import LiveFrame, Message, live_frame, state_message
 from ..output.recorder import Moment, Recorder
 from ..poses.stream import PoseStream
 from .answering import Answer, Answerer
@@ -108,7 +108,7 @@ class Daemon:
             recording_files(configuration, detector.session.model),
             lambda event, level, folder: log(event, level, folder=folder),
         )
-        self._last: Message | None = None
+        self._last: LiveFrame | None = None
         self._health = Health(1e-3 * camera.lost_ms, (1e-3 * status.budget_ms) or math.inf)
         self._sent = 0.0  # when the last message was sent
         self._stops = 0  # how often a signal has asked to stop
@@ -200,7 +200,7 @@ class Daemon:
         self._notifier.send(READY=1)
         self._log("ready", model=self._configuration.model, proved=self._proved, camera=without_password(camera.source))
         if status.page:
-            self._log("status page", address=status.page, token=self.page.token)
+            self._log("status page", url=f"http://{status.page}/", token=self.page.token)
             if self.page.not_kept:
                 self._log("the next start will have another token", "warning", reason=self.page.not_kept)
         self._clock_offset = _clock_offset()
@@ -268,12 +268,13 @@ class Daemon:
         shot, detections = answer.shot, answer.detections
         # The camera may be lost while its last frame is processed; a frame that says so would contradict itself.
         state = "degraded" if self._state.name == "camera_lost" else self._state.name
-        self._last = live_message(self._counters.outcomes.frames, state, shot, detections, answer.time)
-        self._send(self._last, answer)
+        self._last = live_frame(self._counters.outcomes.frames, state, shot, detections, answer.time)
+        message = self._last.as_dict()
+        self._send(message, answer)
         for event, reason in self._remarks.about(answer):
             self._log(event, "warning", reason=reason)
         self.page.show(answer)
-        self._recorder.keep(Moment(shot, answer.lens, answer.orientation, self._last))
+        self._recorder.keep(Moment(shot, answer.lens, answer.orientation, message))
 
     def _report_bad_pose(self, reason: str) -> None:
         self._health.add_trouble(time.monotonic(), reason)
@@ -291,12 +292,14 @@ class Daemon:
 
     def _status(self) -> Message:
         """State, counts, and the last frame's message."""
-        return state_message(self._state.name, self._state.reason) | {
-            "counts": self._counters.counts(),
-            "memory_mib": round(resident_bytes() / 2**20, 1),
-            "model_sha256": self.answerer.detector.session.model.sha256,
-            "last": self._last,
-        }
+        return state_message(
+            self._state.name,
+            self._state.reason,
+            counts=self._counters.counts(),
+            memory_mib=resident_bytes() / 2**20,
+            model_sha256=self.answerer.detector.session.model.sha256,
+            last=self._last,
+        )
 
     def _use_threshold(self, name: str, value: float) -> None:
         """Let recordings have a threshold that the status page has changed."""

@@ -22,6 +22,9 @@ from .page_token import kept_token
 from .system import read_temperatures
 from .threshold import threshold_name, with_settings, with_threshold
 
+_FRAME_RATE = 10.0
+"""Of the stream [1/s]."""
+
 _PAGE = Path(__file__).with_name("status_page.html")
 
 _REST = 4.0
@@ -48,7 +51,7 @@ class StatusPage:
         self._answerer, self._status, self._record, self._metrics = answerer, status, record, metrics
         self._use_threshold = use_threshold
         self._html = _PAGE.read_bytes()
-        self._views = FrameViews(answerer.configuration.status.picture_fps)
+        self._views = FrameViews(_FRAME_RATE)
         self._pose: Message | None = None  # of the last frame
         self._previewing = asyncio.Lock()
         self._next_preview = 0.0  # when the next one may begin [s]

@@ -1,120 +1,138 @@
-"""The binary form of messages: a header of 64 bytes, then arrays of records, little-endian.
+"""The binary form of messages: a header, then lists of records, then a text; all numbers little-endian.
 
-docs/daemon.md lists the layout, with a reader. Numbers have the digits of the JSON form, in single precision; the times
-`t` and `wall` are in double precision. A header is followed by the records of each kind in the order of RECORDS, and by
-a text: the names of the frame's classes, one per line, or the reason of a state.
+It follows from the records of messages (borders/records.py): the same fields in the same order, each number with the
+digits of the JSON form. docs/daemon.md shows the layout, with a reader.
 """
 
 from __future__ import annotations
 
 import math
-import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
+from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
 
-from .messages import STATES, Message
+from ..borders.records import Entry, Record, entries
+from .messages import LiveFrame, Message
 
-VERSION = 3
-"""Second field of the header. Any change of the layout changes it."""
+Field = tuple[str, str, tuple[int, ...]]
+"""Name, type and shape, as numpy takes them."""
 
-HEADER = struct.Struct("<I4B2d2I3f10H")
-"""Length of the rest, version, kind (0: state, 1: frame), state, whether there are features of the field (0 or 1), t,
-wall, frame, points, age_ms, latency_ms, total time [ms], the number of records of each kind, bytes of the text, 0."""
 
-_UPRIGHT = "class:<u4 confidence:<f4 position:(2,)<f4 distance:<f4 bearing:(3,)<f4 pixel:(2,)<f4 width:<f4"
+def is_list(entry: Entry) -> bool:
+    """Whether a field of a frame is a list of records, also if it has at most one."""
+    return entry.many is tuple or entry.sent.shape[:1] == (-1,) or (entry.is_record and entry.sent.null)
 
-_FIELDS = {
-    "detections": "class:<u4 confidence:<f4 position:(3,)<f4 distance:<f4 bearing:(3,)<f4 center:(2,)<f4 radius:<f4 "
-    "angular_radius:<f4 distance_by_angle:<f4 distances_agree:<u4 points:<u4 track:<u4 track_position:(3,)<f4 "
-    "track_velocity:(2,)<f4 track_position_error:<f4 track_velocity_error:<f4",
-    "posts": _UPRIGHT,
-    "goals": "left:<u4 right:<u4",
-    "robots": _UPRIGHT,
-    "lines": "ends:(2,2)<f4 pixels:(2,2)<f4 confidence:<f4",
-    "circle": "center:(2,)<f4 radius:<f4 arc:<f4 confidence:<f4",
-    "crossings": "kind:<u4 position:(2,)<f4 heading:<f4 confidence:<f4",
-    "border": "point:(2,)<f4 pixel:(2,)<f4",
+
+def number_type(entry: Entry) -> str:
+    """The type of a field's numbers; empty for what the binary form lacks: free texts, constants, and any JSON."""
+    if entry.type is float:
+        return "<f8" if entry.sent.digits > 5 else "<f4"
+    is_coded = entry.attribute == "class_name" or len(entry.sent.allowed) > 1
+    return "<u4" if entry.type in (int, bool) or (entry.type is str and is_coded) else ""
+
+
+def _frame_entries(record: type[Record]) -> Iterator[Entry]:
+    """The fields of a frame; behind a part, such as the field, those of this part."""
+    for each in entries(record):
+        if each.is_record or number_type(each):
+            yield each
+        if each.is_record and not is_list(each):
+            yield from _frame_entries(each.type)
+
+
+def _fields(row: tuple[Entry, ...], prefix: str = "") -> Iterator[Field]:
+    """The fields of a record; a part of it, such as a track, has the prefix of its name."""
+    for each in row:
+        if each.is_record:
+            yield from _fields(entries(each.type), f"{each.name}_")
+        elif kind := number_type(each):
+            names = (len(each.sent.allowed),) if each.many else ()
+            yield prefix + each.name, kind, names or each.sent.shape[each.sent.shape[:1] == (-1,) :]
+
+
+ENTRIES = {each.name: each for each in _frame_entries(LiveFrame)}
+"""The fields of a frame in the binary form, by name."""
+
+_LISTS = {
+    name: list(_fields(entries(each.type) if each.is_record else (each,)))
+    for name, each in ENTRIES.items()
+    if is_list(each)
 }
 
-RECORDS = {name: np.dtype([tuple(each.split(":")) for each in text.split()]) for name, text in _FIELDS.items()}
-"""The fields of each kind of record, with the names of the JSON form. class: line of the text, from 0. left, right:
-indices in posts, from 0. kind of a crossing: the code of the letter L, T or X. circle: one record or none. border: one
-record per point. track: its id; 0, and NaN in the fields after it, for an object without a track."""
+_HEADER: list[Field] = [
+    *((name, "<u4", ()) for name in ("length", "layout", "is_frame")),
+    *(
+        (name, "<u4", ()) if name in _LISTS or each.is_record else next(_fields((each,)))
+        for name, each in ENTRIES.items()
+    ),
+    ("text", "<u4", ()),
+]
 
-_NO_TRACK: Mapping[str, Any] = {
-    "id": 0,
-    "position": [math.nan] * 3,
-    "velocity": [math.nan] * 2,
-    "position_error": math.nan,
-    "velocity_error": math.nan,
-}
+HEADER = np.dtype(_HEADER)
+"""length: bytes that follow it. layout: LAYOUT. is_frame: 0 for a state. Then the fields of a frame: of a list, the
+number of its records; of a part, whether it is there. text: bytes of the text."""
 
-_MOST = 0xFFFF
-"""Most records of a kind, and most bytes of the text: their numbers have two bytes."""
+RECORDS = {name: np.dtype(fields) for name, fields in _LISTS.items()}
+"""The type of the records of each list, in the order of a message."""
+
+LAYOUT = crc32(repr((_HEADER, _LISTS, [each.sent.allowed for each in ENTRIES.values()])).encode())
+"""A number that changes with the layout."""
 
 
 def to_binary(message: Message) -> bytes:
-    """A message of a live detector in the binary form. `truth` and the time of each stage are left out."""
-    field = message.get("field") or {}
+    """A message of a live detector in the binary form. `truth` is left out.
+
+    The text has the names of the frame's classes, one per line, or the reason of a state.
+    """
+    values = message | message.get("field", {})
     codes: dict[str, int] = {}
-    records = [
-        _records(RECORDS["detections"], map(_with_track_fields, message.get("detections", ())), codes),
-        _records(RECORDS["posts"], field.get("posts", ()), codes),
-        np.array([tuple(each) for each in field.get("goals", ())], RECORDS["goals"]),
-        _records(RECORDS["robots"], field.get("robots", ()), codes),
-        _records(RECORDS["lines"], field.get("lines", ()), codes),
-        _records(RECORDS["circle"], filter(None, [field.get("circle")]), codes),
-        _records(RECORDS["crossings"], field.get("crossings", ()), codes),
-        _border_records(field.get("border")),
-    ]
-    records = [each[:_MOST] for each in records]
-    # Cut between characters: half of one would make the whole text unreadable.
-    text = message.get("reason", "\n".join(codes)).encode()[:_MOST].decode(errors="ignore").encode()
-    body = b"".join([*(each.tobytes() for each in records), text])
-    header = HEADER.pack(
-        HEADER.size - 4 + len(body),
-        VERSION,
-        message["type"] == "frame",
-        STATES.index(message["state"]),
-        "field" in message,
-        message["t"],
-        message["wall"],
-        message.get("frame", 0) & 0xFFFFFFFF,
-        message.get("points", 0),
-        message.get("age_ms", 0.0),
-        message.get("latency_ms", 0.0),
-        message.get("timing_ms", {}).get("total", 0.0),
-        *map(len, records),
-        len(text),
-        0,
-    )
-    return header + body
+    lists = {
+        name: np.array(list(_rows(ENTRIES[name], values.get(name), codes)), kind) for name, kind in RECORDS.items()
+    }
+    text = message.get("reason", "\n".join(codes)).encode()
+    body = b"".join([*(each.tobytes() for each in lists.values()), text])
+    head = np.zeros((), HEADER)
+    head["length"] = HEADER.itemsize - 4 + len(body)
+    head["layout"], head["is_frame"], head["text"] = LAYOUT, message["type"] == "frame", len(text)
+    for name, each in ENTRIES.items():
+        if name in lists:
+            head[name] = len(lists[name])
+        else:
+            head[name] = name in message if each.is_record else _number(each, values.get(name), codes)
+    return head.tobytes() + body
 
 
-def _records(
-    dtype: np.dtype[np.void], values: Iterable[Mapping[str, Any]], codes: dict[str, int]
-) -> npt.NDArray[np.void]:
-    """The records of these dictionaries. codes: number of each class name; it gets the new ones."""
-
-    def code(name: str, value: Any) -> Any:
-        if name == "class":
-            return codes.setdefault(value, len(codes))
-        return ord(value) if name == "kind" else value
-
-    names = dtype.names or ()
-    return np.array([tuple(code(name, each[name]) for name in names) for each in values], dtype)
-
-
-def _with_track_fields(detection: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A detection whose track is in fields of its own."""
-    track = detection.get("track", _NO_TRACK)
-    return {**detection, "track": track["id"], **{f"track_{name}": track[name] for name in _NO_TRACK}}
+def _rows(entry: Entry, value: Any, codes: dict[str, int]) -> Iterator[tuple[Any, ...]]:
+    """The records of a list. codes: number of each class name; it gets the new ones."""
+    if value is None:
+        return
+    if not entry.is_record:
+        yield from ((each,) for each in value)
+    elif entry.many:
+        yield from (tuple(_row(entry.type, each, codes)) for each in value)
+    elif all(each.sent.shape[:1] == (-1,) for each in entries(entry.type)):
+        yield from zip(*value.values(), strict=True)
+    else:
+        yield tuple(_row(entry.type, value, codes))
 
 
-def _border_records(border: Mapping[str, Any] | None) -> npt.NDArray[np.void]:
-    """The points of a border, or no records without one."""
-    pairs = [] if border is None else list(zip(border["points"], border["pixels"], strict=True))
-    return np.array(pairs, RECORDS["border"])
+def _row(record: type[Record], value: Mapping[str, Any], codes: dict[str, int]) -> Iterator[Any]:
+    """The values of a record; of a part that is not there, 0 and NaN."""
+    for each in entries(record):
+        if each.is_record:
+            yield from _row(each.type, value.get(each.name, {}), codes)
+        elif number_type(each):
+            yield _number(each, value.get(each.name), codes)
+
+
+def _number(entry: Entry, value: Any, codes: dict[str, int]) -> Any:
+    """The number, or numbers, of a field; 0 or NaN if it is not there."""
+    if value is None:
+        return math.nan if entry.type is float else 0
+    if entry.many:
+        return [value.get(name, math.nan) for name in entry.sent.allowed]
+    if entry.type is str:
+        return entry.sent.allowed.index(value) if entry.sent.allowed else codes.setdefault(value, len(codes))
+    return value % 2**32 if entry.type is int else value

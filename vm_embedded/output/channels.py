@@ -20,17 +20,16 @@ from ..borders.sockets import (
     datagram_socket,
     parse_address,
 )
-from ..config.entries import check_entries, entry, file_name, number, one_of, switch, text_line
+from ..config.entries import check_entries, entry, file_name, number, one_of, switch
 from ..errors import InputError
 from .binary_form import to_binary
 from .file_channel import DescriptorChannel, FileChannel
-from .messages import Message, to_json_line, to_ros
+from .messages import Message, to_json_line
 from .readable_line import to_readable_line
 
 _PAUSE = 0.1
 """Time between two reads of what a reader sends [s]: a flood of it would take the processor from the frames."""
 
-FORMATS = ("json", "ros")
 UNIX_FORMATS = ("lines", "binary")
 
 _UDP_EXAMPLE = "127.0.0.1:5600"
@@ -39,7 +38,7 @@ _UDP_EXAMPLE = "127.0.0.1:5600"
 
 @dataclass(frozen=True, kw_only=True)
 class OutputSettings:
-    """Section [output]: the channels, the format of their messages, and the backlog of slow readers."""
+    """Section [output]: the channels, the form of the Unix socket, and the backlog of slow readers."""
 
     stdout: bool = switch(True, "write lines to standard output")
     file: str = file_name("", "file to append lines to")
@@ -54,11 +53,9 @@ class OutputSettings:
         "Unix socket to create; each reader gets all lines that it takes in time; a relative path is in "
         "$RUNTIME_DIRECTORY, $XDG_RUNTIME_DIR or the private folder /tmp/vm-detect-UID",
     )
-    format: str = one_of(FORMATS, "json", "json, or ros for the field names of vision_msgs and geometry_msgs in ROS 2")
     unix_format: str = one_of(
-        UNIX_FORMATS, "lines", "messages of the Unix socket: lines in the format above, or the compact binary form"
+        UNIX_FORMATS, "lines", "messages of the Unix socket: lines of JSON, or the compact binary form"
     )
-    frame_id: str = text_line("base_footprint", "ROS name of the frame on the ground below the camera")
     backlog_kib: int = number(256, "backlog after which a slow reader loses lines", "KiB", (1, 65536))
 
     def __post_init__(self) -> None:
@@ -79,11 +76,11 @@ class Channel(Protocol):
 
 
 class Channels:
-    """All channels of the settings. readable: standard output gets lines for people, unless the format is ros."""
+    """All channels of the settings. readable: standard output gets lines for people."""
 
     def __init__(self, settings: OutputSettings, readable: bool = False) -> None:
         self.settings = settings
-        self._readable = readable and settings.format != "ros"
+        self._readable = readable
         self._line_channels: list[Channel] = []
         self._readable_channels: list[Channel] = []
         self._binary_channels: list[Channel] = []
@@ -127,7 +124,7 @@ class Channels:
     def send(self, message: Message) -> None:
         """Send a message on all channels."""
         if self._line_channels:
-            line = to_json_line(to_ros(message, self.settings.frame_id) if self.settings.format == "ros" else message)
+            line = to_json_line(message)
             for each in self._line_channels:
                 each.send(line)
         if self._readable_channels and message["type"] == "frame":  # the log says the states

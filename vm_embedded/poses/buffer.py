@@ -82,7 +82,7 @@ class PoseBuffer:
             )
 
     def at(self, time: float) -> Orientation:
-        """The orientation at a time [s], interpolated if the settings say so.
+        """The interpolated orientation at a time [s].
 
         Raises StalePoseError if no pose is near enough.
         """
@@ -94,7 +94,7 @@ class PoseBuffer:
         times = [each[0] for each in self._poses]
         if time < times[0] - 1e-3 * self.settings.max_age_ms:
             raise StalePoseError(f"oldest pose is {1e3 * (times[0] - time):.0f} ms newer than the frame")
-        if not self.settings.interpolate or len(self._poses) == 1:
+        if len(self._poses) == 1:
             return self._poses[-1][1]
         if time > times[-1]:
             return self._extrapolated(times, min(time - times[-1], 1e-3 * self.settings.extrapolate_ms))

@@ -6,7 +6,7 @@ from dataclasses import Field, dataclass
 from typing import Any
 
 from ..borders.sockets import parse_address
-from ..config.entries import check_entries, entry, number, one_of, switch
+from ..config.entries import check_entries, entry, number, one_of
 from ..errors import InputError
 
 CLOCKS = ("monotonic", "wall", "arrival")
@@ -62,7 +62,6 @@ class PoseSettings:
     )
     latency_ms: float = number(0.0, "time to subtract from t", "ms", (-1000, 1000))
     wait_ms: float = number(40.0, "longest time to wait for a pose that is not older than the frame", "ms", (0, 1000))
-    interpolate: bool = switch(True, "interpolate between the poses before and after the frame; else use the newest")
     extrapolate_ms: float = number(5.0, "longest time to extrapolate beyond the newest pose", "ms", (0, 100))
     max_age_ms: float = number(
         100.0, "a frame is not processed if the newest pose is older than the frame by more than this", "ms", (1, 10000)

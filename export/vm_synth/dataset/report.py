@@ -89,25 +89,12 @@ def as_json(found: Inspection) -> dict[str, Any]:
     }
 
 
-def tables(found: Inspection, shards: int = 1) -> str:
-    """Tables as text: the progress, per shard if there are several, and what the pictures show."""
-    parts = [_progress(found, shards)]
+def tables(found: Inspection) -> str:
+    """Tables as text: the progress, and what the pictures show."""
+    parts = [f"{len(found.done)} of {found.count} pictures exist, {len(found.faults)} of them are invalid"]
     if found.facts:
         parts += [_quantity_table(found.facts), _category_table(found)]
     return "\n\n".join(parts)
-
-
-def _progress(found: Inspection, shards: int) -> str:
-    lines = [f"{len(found.done)} of {found.count} pictures exist, {len(found.faults)} of them are invalid"]
-    if shards > 1:
-        rows = []
-        for number in range(shards):
-            own = range(number, found.count, shards)
-            there = sum(index % shards == number for index in found.done)
-            bad = sum(each.index % shards == number for each in found.faults)
-            rows.append([f"{number + 1}/{shards}", str(there), str(len(own)), str(bad)])
-        lines += ["", *aligned([["shard", "exist", "of", "invalid"], *rows])]
-    return "\n".join(lines)
 
 
 def _quantity_table(facts: Sequence[Facts]) -> str:

@@ -46,7 +46,7 @@ def check_parser() -> argparse.ArgumentParser:
     """The options of vm-train check DATA."""
     made = Parser(
         prog="vm-train check",
-        description="Read all pictures of a folder, or of the shards in it. Print tables of their contents, and list "
+        description="Read all pictures of a folder. Print tables of their contents, and list "
         "the unusable pictures. With --boxes, do this for images with boxes. Exit status: 0 if all can be used, 1 "
         "otherwise.",
     )

@@ -18,10 +18,9 @@ from vm_workstation.stopping import stoppable
 
 from .evaluate_boxes import run_boxes
 from .evaluate_calibrate import run_calibrate
-from .evaluate_options import boxes_parser, calibrate_parser, points_parser
+from .evaluate_options import boxes_parser, calibrate_parser
 from .evaluate_options import parser as parser
 from .evaluate_options import parsers as parsers
-from .evaluate_points import run_points
 from .evaluating import detector_settings, evaluate_with_progress, other_radii
 
 if TYPE_CHECKING:
@@ -39,8 +38,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stoppable():
             if given[:1] == ["calibrate"]:
                 return run_calibrate(calibrate_parser().parse_args(given[1:]))
-            if given[:1] == ["points"]:
-                return run_points(points_parser().parse_args(given[1:]))
             if any(each.partition("=")[0] == "--boxes" for each in given):
                 asks = {"-h", "--help"}.intersection(given)  # --boxes alone would want its folder first
                 return run_boxes(boxes_parser().parse_args(["--help"] if asks else given))
@@ -73,7 +70,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     options.model = model_path(options.model)
     settings = detector_settings(options)
     pictures = select_pictures(options.data, options.list, options.part)
-    rules = Rules(options.radius_of, options.min_radius, options.strict)
+    rules = Rules(options.radius_of, options.strict)
     check_evaluation_folder(options.output, (options.model, options.list, options.config))
     new_figure(1.0, 1.0)  # fails now, not after an hour, if matplotlib is missing
     subject = _subject(options, settings)
@@ -127,7 +124,7 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
             "part": options.part if options.list is not None and options.list.suffix == ".json" else None,
             "colors": [f"{name} {list(map(list, each))}" for name, each in colors.items()],
         },
-        "rules": {"radius_of": options.radius_of, "min_radius": options.min_radius, "as_robot": options.as_robot},
+        "rules": {"radius_of": options.radius_of, "as_robot": options.as_robot},
         "settings": asdict(settings),
     }
 

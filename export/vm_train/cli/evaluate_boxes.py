@@ -18,7 +18,7 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import ModelFile, read_model
-from vm_embedded.output.box_files import read_object_file
+from vm_embedded.output.box_files import OBJECT, read_object_file
 
 from ..boxes.box import BoxedPicture
 from ..boxes.findings import finding_lines
@@ -51,13 +51,14 @@ def run_boxes(options: argparse.Namespace) -> int:
     _complain(finding_lines(found.findings, False, f"vm-train check {options.boxes} --boxes --verbose lists all"))
     check_boxes(found, name, str(options.boxes))
     frames = _chosen(found.pictures, options.boxes, options.list, options.part)
-    if settings.object_radius is None:
-        settings = replace(settings, object_radius=_radius_of(frames))
     posed = sum(_has_pose(each) for each in frames)
     search = None if posed == len(frames) else Search.of(found.pictures, name, is_round(manifest))
     bare = next((each for each, model in models.items() if model.manifest.searched_class is None), None)
     if search is not None and bare is not None:
         raise InputError(f"{bare} has no close look, so it needs lens and pose of each frame")
+    if search is None and settings.object_radius is None and (radius := _radius_of(frames)):
+        settings = replace(settings, object_radius=radius)
+        _complain([f"object radius {radius} m, from {OBJECT}"])
     bar = ProgressBar(len(frames) * len(models), "vm-evaluate")
     try:
         workers = options.workers or len(os.sched_getaffinity(0))
@@ -82,8 +83,7 @@ def run_boxes(options: argparse.Namespace) -> int:
 
 def _radius_of(frames: Sequence[BoxedPicture]) -> float | None:
     """The radius [m] in the object.toml beside all frames, if it is the same. Raises InputError."""
-    shapes = [read_object_file(each) for each in {frame.image.parent for frame in frames}]
-    radii = {None if each is None else each.radius for each in shapes}
+    radii = {getattr(read_object_file(each), "radius", None) for each in {frame.image.parent for frame in frames}}
     return radii.pop() if len(radii) == 1 else None
 
 
@@ -133,8 +133,8 @@ def _about(options: argparse.Namespace, models: dict[str, ModelFile], whole: boo
         "networks": [{"file": name, "sha256": each.sha256} for name, each in models.items()],
         "measured": "whole detector" if whole else "close look",
         "boxes": str(options.boxes),
-        "list": None if options.list is None else str(options.list),
-        "part": None if options.list is None else options.part or "test",
+        "list": options.list and str(options.list),
+        "part": options.list and (options.part or "test"),
     }
 
 

@@ -65,7 +65,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         raise ModelError(f"{path} has no peaks: only their confidence, and that of close looks, can be calibrated")
     pictures = select_pictures(options.data, options.list, options.part)
     classes = classes_with_colors(model.manifest, default_colors(path, options.list), options.color)
-    rules = Rules(options.radius_of, options.min_radius, options.strict)
+    rules = Rules(options.radius_of, options.strict)
     job = Job(path, _CANDIDATES, False, classes, rules)
     tries = _tries(looks_of(model), job, pictures, options.workers)
     if options.radius_of == "all":

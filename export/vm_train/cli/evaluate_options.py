@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
 from vm_embedded.cli.options import add_settings
@@ -18,7 +17,6 @@ other commands, with their own --help:
                           score what networks find in your own frames with boxes, side by side
   vm-evaluate calibrate   make the confidence of a model file fit pictures: of the objects that it finds with confidence
                           0.9, nine of ten are then right
-  vm-evaluate points      draw the paper's figure of points on a ball over its distance; it needs no network
 
 Exit status: 0 files written, 1 error (see standard error), 2 wrong usage, 130 interrupted.
 """
@@ -27,7 +25,7 @@ Exit status: 0 files written, 1 error (see standard error), 2 wrong usage, 130 i
 def parser() -> argparse.ArgumentParser:
     """The options of vm-evaluate MODEL DATA."""
     made = Parser(
-        commands=("calibrate", "points"),
+        commands=("calibrate",),
         prog="vm-evaluate",
         description="Evaluate a network on pictures with masks. Write scores of points and of objects, by distance, as "
         "JSON, CSV, plots and one HTML page.",
@@ -38,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
         "model",
         type=Path,
         metavar="MODEL",
-        help="checkpoint (.pt), model file (.onnx), or one from the package: ball, ball-small or soccer",
+        help="checkpoint (.pt), model file (.onnx), or one from the package: ball or soccer",
     )
     _add_data(made)
     made.add_argument(
@@ -73,7 +71,7 @@ def boxes_parser() -> argparse.ArgumentParser:
         "models",
         nargs="*",  # an option --names before them takes them along; see run_boxes
         metavar="MODEL",
-        help="model file (.onnx), or one from the package: ball, ball-small or soccer",
+        help="model file (.onnx), or one from the package: ball or soccer",
     )
     made.add_argument(
         "--boxes",
@@ -118,7 +116,7 @@ def calibrate_parser() -> argparse.ArgumentParser:
         "model",
         type=Path,
         metavar="MODEL",
-        help="model file (.onnx) with a close look, or one from the package: ball, ball-small or soccer",
+        help="model file (.onnx) with a close look, or one from the package: ball or soccer",
     )
     _add_data(made)
     made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="model file to write (.onnx)")
@@ -133,7 +131,7 @@ def _add_data(made: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="DATA",
-        help="folder of imageX.jpg or .png, maskX.png and lensX.yaml, or of shards",
+        help="folder of imageX.jpg or .png, maskX.png and lensX.yaml",
     )
 
 
@@ -168,58 +166,15 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         "all pictures; scene: the radius of each picture's ball (sceneX.json of vm-synth); default all",
     )
     group.add_argument(
-        "--min-radius",
-        type=_length,
-        default=2.0,
-        metavar="PX",
-        help="ignore true objects of a smaller radius [px]; default 2",
-    )
-    group.add_argument(
         "--strict",
         action="store_true",
         help="stop at a picture that can't be used; default: skip it. An unknown color in a mask always stops",
     )
 
 
-def points_parser() -> argparse.ArgumentParser:
-    """The options of vm-evaluate points."""
-    made = Parser(
-        prog="vm-evaluate points",
-        description="Draw the number of mesh points on a ball over its distance, for the Visual Mesh and for a "
-        "hexagonal mesh. The camera is like that of the paper: 1280 x 1024 px, equisolid, f = 420 px.",
-    )
-    made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="figure to write, .png or .svg")
-    made.add_argument(
-        "--intersections",
-        type=_numbers,
-        default=(3.0, 4.0, 5.0),
-        metavar="K,...",
-        help="rings of points across a ball, one curve for each K; default 3,4,5",
-    )
-    made.add_argument("--radius", type=_length, default=0.075, metavar="M", help="ball radius [m]; default 0.075")
-    made.add_argument("--height", type=_length, default=0.9, metavar="M", help="camera height [m]; default 0.9")
-    made.add_argument(
-        "--pitch", type=float, default=45.0, metavar="DEG", help="camera pitch, positive down [deg]; default 45"
-    )
-    made.add_argument(
-        "--equal-at",
-        type=_length,
-        metavar="M",
-        help="both meshes have the same number of points on a ball at this distance [m]; default: the same number in "
-        "the whole picture",
-    )
-    made.add_argument(
-        "--early",
-        action="store_true",
-        help="also draw the Visual Mesh with the theta (azimuth angle of an object) of an early version of the "
-        "reference implementation",
-    )
-    return made
-
-
 def parsers() -> dict[str, argparse.ArgumentParser]:
     """All parsers by command, as typed."""
-    return {each.prog: each for each in (parser(), boxes_parser(), calibrate_parser(), points_parser())}
+    return {each.prog: each for each in (parser(), boxes_parser(), calibrate_parser())}
 
 
 def _color(text: str) -> tuple[str, tuple[int, int, int]]:
@@ -229,20 +184,3 @@ def _color(text: str) -> tuple[str, tuple[int, int, int]]:
         raise argparse.ArgumentTypeError(f"{text!r}: write CLASS=R,G,B with values up to 255, for example ball=255,0,0")
     red, green, blue = map(int, parts)
     return name, (red, green, blue)
-
-
-def _length(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of at least 0")
-    return value
-
-
-def _numbers(text: str) -> tuple[float, ...]:
-    values = tuple(_length(each) for each in text.split(","))
-    if not all(values):
-        raise argparse.ArgumentTypeError(f"{text!r}: write numbers above 0, for example 3,4,5")
-    return values

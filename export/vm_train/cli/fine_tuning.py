@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from ..tuning.run_folder import TuningRun
 
 _FEW = 25
-"""Frames for training; with fewer, the share of found boxes varied by half between seeds (docs/own-frames.md)."""
+"""Frames for training; with fewer, the share of found boxes varied by half between seeds
+(benchmarks/experiments/fine-tuning.md)."""
 
 
 def tune_config_parser() -> argparse.ArgumentParser:

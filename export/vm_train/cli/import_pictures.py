@@ -1,4 +1,4 @@
-"""vm-train import: training data of the reference implementation as a folder of pictures."""
+"""vm-train import: tar archives of pictures, or TFRecord files of the reference, as a folder of pictures."""
 
 from __future__ import annotations
 
@@ -6,26 +6,32 @@ import argparse
 import sys
 from pathlib import Path
 
+from vm_embedded.borders.credentials import without_credentials
+from vm_embedded.borders.text import printable
 from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError, unknown
 
 from ..formats.picture_example import KEYS
-from ..formats.tfrecord_import import import_records
 
 _SHOWN = 20
-"""Skipped records to print; a wrong name of a feature skips all of them."""
+"""Skipped pictures to print; a wrong name of a feature skips all of them."""
 
 
 def import_parser() -> argparse.ArgumentParser:
     """The options of vm-train import FILES... OUT."""
     made = Parser(
         prog="vm-train import",
-        description="Convert TFRecord files (plain or gzip) of the reference implementation to a folder of pictures. "
-        "Images and masks are copied without any change; a file beside them holds lens and pose. Records without a "
-        "usable picture are named and skipped. To continue an import that was stopped, repeat the command.",
+        description="Unpack tar archives of pictures, or convert TFRecord files of the reference implementation, to a "
+        "folder of pictures. Files may be compressed with gzip. Images and masks are copied without any change. What "
+        "can't be used is named and skipped. To continue an import that was stopped, repeat the command.",
     )
-    made.add_argument("files", type=Path, nargs="+", metavar="FILES", help="TFRecord files, in this order")
+    made.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILES",
+        help="files *.tar or *.tar.gz, web addresses of such files, or - for standard input; others are TFRecord files",
+    )
     made.add_argument("out", type=Path, metavar="OUT", help="folder to write to; created if missing")
     made.add_argument(
         "--key",
@@ -39,9 +45,9 @@ def import_parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--normalized",
         action="store_true",
-        help="the files give lens/focal_length, lens/centre and lens/k for images of width 1; default: in pixels",
+        help="TFRecord files give lens/focal_length, lens/centre and lens/k for images of width 1; default: in pixels",
     )
-    made.add_argument("--strict", action="store_true", help="stop at the first record without a usable picture")
+    made.add_argument("--strict", action="store_true", help="fail if a record or picture can't be used")
     return made
 
 
@@ -56,9 +62,11 @@ def _renamed(text: str) -> tuple[str, str]:
 
 def run_import(options: argparse.Namespace) -> int:
     """Import as the options say and return the exit status. Raises InputError, also if no picture was imported."""
+    from ..formats.importing import import_pictures
+
     bar = ProgressBar(100)
     try:
-        result = import_records(
+        result = import_pictures(
             options.files,
             options.out,
             dict(options.key),
@@ -68,13 +76,14 @@ def run_import(options: argparse.Namespace) -> int:
         )
     finally:
         bar.clear()
-    for fault in result.skipped[:_SHOWN]:
-        print(f"vm-train: skipped {fault}", file=sys.stderr)
+    lines = [f"skipped {fault}" for fault in result.skipped[:_SHOWN]]
     if len(result.skipped) > _SHOWN:
-        print(f"vm-train: skipped {len(result.skipped) - _SHOWN} more records", file=sys.stderr)
+        lines.append(f"skipped {len(result.skipped) - _SHOWN} more")
+    for line in (*lines, *result.remarks):
+        print(f"vm-train: {printable(line)}", file=sys.stderr)
     if not result.count and not result.there:
-        raise InputError(f"found no usable picture in {', '.join(str(each) for each in options.files)}")
+        raise InputError(f"found no usable picture in {', '.join(map(without_credentials, options.files))}")
     before = f", {result.there} were there already" if result.there else ""
-    skipped = f", {len(result.skipped)} records skipped" if result.skipped else ""
+    skipped = f", {len(result.skipped)} skipped" if result.skipped else ""
     print(f"{options.out}: {result.count} pictures imported{before}{skipped}")
     return EXIT_OK

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from vm_workstation.option_types import add_device, add_set, at_least
 from vm_workstation.worker_process import check_shared_memory
 
 from ..data.pictures import find_pictures
-from ..data.split import split_by_seed
+from ..data.split import split_beside, split_by_seed
 from ..learning.class_table import ClassTable
 from ..learning.folder_access import locked
 from ..look.configuration import LOOK_HEADER, LookConfiguration
@@ -124,8 +124,9 @@ def run_look(options: argparse.Namespace) -> int:
     start, configuration = _start_and_configuration(options)
     model = model_path(options.model)
     configuration = _with_classes_of(model, configuration)
-    numbers = [each.number for each in find_pictures(options.data)]
-    split = split_by_seed(numbers, configuration.data.validation, 0.0, configuration.data.split_seed)
+    numbers, data = [each.number for each in find_pictures(options.data)], configuration.data
+    earlier = split_beside(model, options.data)
+    split = split_by_seed(numbers, data.validation, 0.0, data.split_seed, earlier)
     with locked(options.output):
         run = begin_look_run(
             options.output,
@@ -138,10 +139,9 @@ def run_look(options: argparse.Namespace) -> int:
             threads=options.threads or 1,
             start=start,
         )
-        count = len(split.training), len(split.validation)
-        print(
-            f"{options.data}: {len(numbers)} pictures: {count[0]} for training, {count[1]} for validation", flush=True
-        )
+        count = [len(each) for each in asdict(split).values()]
+        parts = f"{count[0]} for training, {count[1]} for validation, {count[2]} for test"
+        print(f"{options.data}: {sum(count)} pictures: {parts}", flush=True)
         return _train(run.folder, None, options)
 
 

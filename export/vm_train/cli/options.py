@@ -15,8 +15,6 @@ from .fine_tuning import tune_config_parser
 from .import_boxes import import_boxes_parser
 from .import_pictures import import_parser
 from .look import look_config_parser, look_parser
-from .shards import shards_parser
-from .stream_options import add_stream
 
 _EPILOG = """\
 other commands (add --help for their options):
@@ -26,9 +24,8 @@ other commands (add --help for their options):
   vm-train resume RUN            continue a training that was stopped
   vm-train preview DATA          draw augmented pictures with points of the mesh
   vm-train rate DATA             find a learning rate
-  vm-train import FILES OUT      convert TFRecord files of the reference
+  vm-train import FILES OUT      unpack tar archives, convert TFRecord files
   vm-train import-boxes DIR OUT  make masks of frames with boxes, lens and pose
-  vm-train shards DATA OUT       pack pictures into tar files
   vm-train config, vm-train look-config, vm-train tune-config
                                  print a configuration with all its entries
 
@@ -125,7 +122,6 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         config_parser(),
         import_parser(),
         import_boxes_parser(),
-        shards_parser(),
     )
     return {each.prog: each for each in made}
 
@@ -164,7 +160,6 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
         help="cache of decoded pictures; default RUN/unpacked",
     )
     cache.add_argument("--no-unpacked", action="store_true", help="no such cache; for slow or small disks")
-    add_stream(group)
 
 
 def _add_hardware(made: argparse.ArgumentParser) -> None:

@@ -25,7 +25,6 @@ from .import_boxes import run_import_boxes
 from .import_pictures import run_import
 from .look import print_look_config, resume_look, run_look
 from .options import parsers
-from .shards import run_shards
 from .training import find_good_pictures, read_configuration, run_resume, run_training
 
 _TRAININGS = (None, "look", "resume")
@@ -47,7 +46,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "tune-config": print_tune_config,
         "import": run_import,
         "import-boxes": run_import_boxes,
-        "shards": run_shards,
     }
     command = given[0] if given[:1] and given[0] in commands else None
     prog = "vm-train" if command is None else f"vm-train {command}"

@@ -28,7 +28,6 @@ from ..data.split import Split, split_by_lists, split_by_seed
 from ..learning.configuration import TrainConfiguration
 from ..learning.folder_access import locked
 from .check import complaints
-from .stream_options import stream_source
 
 if TYPE_CHECKING:
     from ..learning.hardware import Hardware
@@ -133,20 +132,14 @@ def _begin(
     from ..learning.training_data import TrainingData
 
     check_unused(options.output, FILES)
-    source = stream_source(options, configuration, hardware)
     good = find_good_pictures(options.data, configuration, hardware, options.strict)
-    if source is None:
-        split = _split(options, configuration, good)
-        training = str(len(split.training))
-    else:
-        split = Split((), tuple(each.number for each in good))
-        training = f"{source.epoch} an epoch of {len(source.shards)} shards"
-    parts = f"{training} for training, {len(split.validation)} for validation, {len(split.test)} for test"
-    print(f"{options.data}: {len(good)} pictures: {parts}")
-    if remark := _without_bases(configuration, good, source is not None):
+    split = _split(options, configuration, good)
+    counts = f"{len(split.training)} for training, {len(split.validation)} for validation, {len(split.test)} for test"
+    print(f"{options.data}: {len(good)} pictures: {counts}")
+    if remark := _without_bases(configuration, good):
         print(f"vm-train: {remark}", file=sys.stderr)
     unpacked = None if options.no_unpacked else options.unpacked or options.output / UNPACKED
-    data = TrainingData(options.data, split, unpacked, source)
+    data = TrainingData(options.data, split, unpacked)
     run = begin_run(options.output, data, configuration, start)
     if run.selected_points_per_picture < _FEW:
         print(
@@ -156,14 +149,14 @@ def _begin(
         )
 
 
-def _without_bases(configuration: TrainConfiguration, pictures: Sequence[PictureFiles], is_streamed: bool) -> str:
+def _without_bases(configuration: TrainConfiguration, pictures: Sequence[PictureFiles]) -> str:
     """A remark if pictures don't tell where the uprights stand whose bases the network should learn; else ""."""
     names = [each for each in configuration.manifest.peaks if each in UPRIGHTS]
-    missing = len(pictures) if is_streamed else sum(not exists(each.scene) for each in pictures)
+    missing = sum(not exists(each.scene) for each in pictures)
     if not names or not missing:
         return ""
-    which = "streamed pictures have no scene files" if is_streamed else f"{missing} pictures have no sceneX.json"
-    return f"{which}: from them, the network does not learn where the base of a {' or '.join(names)} is"
+    where = f"where the base of a {' or '.join(names)} is"
+    return f"{missing} pictures have no sceneX.json: from them, the network does not learn {where}"
 
 
 def _split(options: argparse.Namespace, configuration: TrainConfiguration, good: Sequence[PictureFiles]) -> Split:
@@ -185,11 +178,6 @@ def _train(folder: Path, hardware: Hardware, moved_to: Path | None = None) -> in
     run = read_run(folder)
     if moved_to is not None:
         run = replace(run, data=replace(run.data, folder=moved_to.resolve()))
-    source = run.data.source
-    if source is not None and source.workers != hardware.workers:
-        hardware = replace(hardware, workers=source.workers)
-        if hardware.is_leader:
-            print(f"vm-train: {hardware.workers} workers read the stream, as run.json says", file=sys.stderr)
     if hardware.is_leader:
         objects = [name for name, kind in run.configuration.classes.kinds.items() if kind == "object"]
         print(

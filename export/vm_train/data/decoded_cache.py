@@ -74,7 +74,7 @@ class DecodedCache:
             start, pixels = _HEADER.size + text, width * height
             if magic != MAGIC or found != source or len(content) != start + 4 * pixels:
                 return None
-            lens = parse_lens(content[_HEADER.size : start].decode("utf-8"), files.lens.name)
+            lens = parse_lens(content[_HEADER.size : start], files.lens.name)
         except (OSError, ValueError, struct.error, InputError):
             return None
         image = np.frombuffer(content, np.uint8, 3 * pixels, start).reshape(height, width, 3)
@@ -150,10 +150,6 @@ def read_through_cache(files: PictureFiles, classes: Classes, cache: DecodedCach
 
 def fingerprint(files: PictureFiles, classes: Classes) -> bytes:
     """Digest of the sources of a decoded picture: sizes and times of its files, and the colors of the classes."""
-    if files.shard is None:
-        stats = [files.path(part).stat() for part in PARTS]
-        places: tuple[object, ...] = ()
-    else:
-        stats, places = [files.shard.stat()], files.places
-    content = _TURNED, [[each.st_size, each.st_mtime_ns] for each in stats], places, list(classes.colors.items())
+    stats = [files.path(part).stat() for part in PARTS]
+    content = _TURNED, [[each.st_size, each.st_mtime_ns] for each in stats], list(classes.colors.items())
     return hashlib.sha256(json.dumps(content).encode()).digest()

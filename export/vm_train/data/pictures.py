@@ -18,8 +18,7 @@ from vm_embedded.geometry.lens_files import LensFile, parse_lens_yaml
 from vm_embedded.geometry.orientation import Orientation
 
 from .classes import Classes, Labels
-from .picture_files import IMAGES, PARTS, PictureFault, PictureFiles, RawPicture
-from .shard_index import find_shards, open_shards
+from .picture_files import PARTS, PictureFault, PictureFiles, parse_name
 
 _LENSES_KEPT = 1 << 14
 
@@ -41,7 +40,7 @@ class Picture:
     @property
     def orientation(self) -> Orientation:
         """The camera's height and attitude."""
-        assert self.lens.orientation is not None  # decode_picture refuses pictures without
+        assert self.lens.orientation is not None  # read_picture refuses pictures without
         return self.lens.orientation
 
     @property
@@ -51,33 +50,26 @@ class Picture:
 
 
 def find_pictures(folder: Path) -> list[PictureFiles]:
-    """All pictures of a folder, or of the tar shards in it, by number.
+    """All pictures of a folder, by number.
 
     Raises InputError if there are none, or if two pictures have the same number.
     """
     if not folder.is_dir():
         raise InputError(f"there is no folder {folder}")
-    parts: dict[str, dict[str, str]] = {"image": {}, "mask": {}, "lens": {}}
-    other = shards = False
-    for name in sorted(entry.name for entry in os.scandir(folder)):
-        stem, dot, suffix = name.rpartition(".")
-        part, suffix = next((each for each in PARTS if stem.startswith(each)), ""), dot + suffix.lower()
-        shards |= suffix == ".tar"
-        if suffix in {"image": IMAGES, "mask": (".png",), "lens": (".yaml",)}.get(part, ()):
-            before = parts[part].setdefault(stem.removeprefix(part), name)
-            if before != name:
-                raise InputError(
-                    f"{folder} has {before} and {name}: two files for the {part} of one picture: remove one of them"
-                )
-        else:
-            other |= part == "image"
-    if not parts["image"] and shards:
-        return open_shards(folder)
-    if shards:
-        shard = find_shards(folder)[0].name
-        raise InputError(f"{folder} has both pictures and shards, for example {shard}: move one kind to another folder")
+    names = sorted(entry.name for entry in os.scandir(folder))
+    parts: dict[str, dict[str, str]] = {"image": {}, "mask": {}, "lens": {}, "scene": {}}
+    for name in names:
+        found = parse_name(name)
+        if found is not None and (before := parts[found.part].setdefault(found.number, name)) != name:
+            raise InputError(
+                f"{folder} has {before} and {name}: two files for the {found.part} of one picture: remove one of them"
+            )
     if not parts["image"]:
-        hint = "the image* files in it have another suffix" if other else "for images with boxes, vm-train has --boxes"
+        hint = "for images with boxes, vm-train has --boxes"
+        if any(name.startswith("image") for name in names):
+            hint = "the image* files in it have another suffix"
+        elif archives := [name for name in names if ".tar" in name]:
+            hint = f"unpack the archives with vm-train import {folder / archives[0]} OUT"
         raise InputError(f"no pictures in {folder}: images must be named imageX.jpg or imageX.png; {hint}")
     return [
         PictureFiles(
@@ -92,36 +84,27 @@ def find_pictures(folder: Path) -> list[PictureFiles]:
 
 def read_picture(files: PictureFiles, classes: Classes) -> Picture:
     """Read a picture. Raises PictureFault, an InputError, naming the file and its fault."""
-    return decode_picture(files.raw(), classes, (files.image.name, files.mask.name, files.lens.name))
-
-
-def decode_picture(raw: RawPicture, classes: Classes, names: tuple[str, str, str] | None = None) -> Picture:
-    """Decode the bytes of a picture's files. names: of image, mask and lens, for messages.
-
-    Raises PictureFault, an InputError, naming the file and its fault.
-    """
-    if names is None:
-        names = (f"image of {raw.number}", f"mask of {raw.number}", f"lens of {raw.number}")
-    image = _decoded(raw.image, names[0], cv2.IMREAD_COLOR)
-    mask = _decoded(raw.mask, names[1], cv2.IMREAD_UNCHANGED)
+    contents = [files.read(part) for part in PARTS]
+    image = _decoded(contents[0], files.image.name, cv2.IMREAD_COLOR)
+    mask = _decoded(contents[1], files.mask.name, cv2.IMREAD_UNCHANGED)
     if mask.ndim != 3 or mask.shape[2] not in (3, 4) or mask.dtype != np.uint8:
         channels = mask.shape[2] if mask.ndim == 3 else 1
         found = f"{channels} channel{'s' * (channels > 1)} of {8 * mask.itemsize} bits"
-        raise PictureFault(f"{names[1]}: a mask must have 3 or 4 channels of 8 bits, not {found}", "color")
+        raise PictureFault(f"{files.mask.name}: a mask must have 3 or 4 channels of 8 bits, not {found}", "color")
     if mask.shape[:2] != image.shape[:2]:
         sizes = (f"{each.shape[1]} x {each.shape[0]}" for each in (mask, image))
-        raise PictureFault(f"{names[1]}: {' px, but the image is '.join(sizes)} px", "size")
-    lens = parse_lens(raw.lens, names[2])
+        raise PictureFault(f"{files.mask.name}: {' px, but the image is '.join(sizes)} px", "size")
+    lens = parse_lens(contents[2], files.lens.name)
     if lens.orientation is None:
-        raise PictureFault(f"{names[2]}: lacks Hoc, the camera's height and orientation", "lens")
+        raise PictureFault(f"{files.lens.name}: lacks Hoc, the camera's height and orientation", "lens")
     try:
         lens.lens.for_image((image.shape[1], image.shape[0]))
     except InputError as error:
-        raise PictureFault(f"{names[2]}: {error}", "lens") from error
+        raise PictureFault(f"{files.lens.name}: {error}", "lens") from error
     try:
         return Picture(image, classes.labels(mask), lens)
     except PictureFault as error:
-        raise PictureFault(f"{names[1]}: {error}", error.kind) from error
+        raise PictureFault(f"{files.mask.name}: {error}", error.kind) from error
 
 
 def _decoded(data: bytes, name: str, how: int) -> Image:
@@ -131,10 +114,12 @@ def _decoded(data: bytes, name: str, how: int) -> Image:
         raise PictureFault(f"{name}: {error}") from error
 
 
-def parse_lens(text: str, name: str) -> LensFile:
+def parse_lens(content: bytes, name: str) -> LensFile:
     """The content of a lens file, parsed once in each process. Raises PictureFault that begins with `name`."""
     try:
-        return _lens(text)
+        return _lens(content.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise PictureFault(f"{name}: is not UTF-8 text", "lens") from error
     except InputError as error:
         raise PictureFault(f"{name}: {error}", "lens") from error
 

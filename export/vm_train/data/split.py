@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
+from itertools import combinations
 from pathlib import Path
 
 from vm_embedded.errors import InputError, one_line
-from vm_embedded.files import read_regular, write_file
+from vm_embedded.files import read_bytes, read_regular, write_file
 
 from .picture_lists import read_list
 
 _DRAWS = 1 << 64
+_HELD_OUT = "validation", "test"
 _NAMED = 5  # pictures to name in a message
 
 
@@ -26,30 +29,32 @@ class Split:
     test: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        parts = list(asdict(self).items())
-        for position, (name, numbers) in enumerate(parts):
-            for other, others in parts[position + 1 :]:
-                shared = sorted(set(numbers).intersection(others))
-                if shared:
-                    more = f" and {len(shared) - _NAMED} more" if len(shared) > _NAMED else ""
-                    raise InputError(f"{name} and {other} share pictures {', '.join(shared[:_NAMED])}{more}")
+        for (name, numbers), (other, others) in combinations(asdict(self).items(), 2):
+            shared = sorted(set(numbers).intersection(others))
+            if shared:
+                more = f" and {len(shared) - _NAMED} more" if len(shared) > _NAMED else ""
+                raise InputError(f"{name} and {other} share pictures {', '.join(shared[:_NAMED])}{more}")
 
 
-def split_by_seed(numbers: Sequence[str], validation: float, test: float, seed: int) -> Split:
+def split_by_seed(
+    numbers: Sequence[str], validation: float, test: float, seed: int, earlier: Split | None = None
+) -> Split:
     """Split pictures at random; `validation` and `test` are the approximate shares of these parts, from 0 to 1.
 
     The part of a picture depends only on the seed, the shares and its number, so new pictures never move the others.
-    Raises InputError for shares that leave nothing for training, and if training or validation gets no picture.
+    What `earlier` has for validation or test stays there. Raises InputError for shares that leave nothing for training,
+    and if training or validation gets no picture.
     """
-    if not (0.0 <= validation <= 1.0 and 0.0 <= test <= 1.0 and validation + test < 1.0):
+    if not (validation >= 0.0 and test >= 0.0 and validation + test < 1.0):
         raise InputError(
             f"shares of validation and test must be at least 0 and add up to less than 1, not {validation} and {test}"
         )
     parts: dict[str, list[str]] = {"training": [], "validation": [], "test": []}
+    kept = {each: name for name in _HELD_OUT for each in getattr(earlier, name, ())}
     for number in numbers:
         drawn = _draw(seed, number)
         part = "validation" if drawn < validation else "test" if drawn < validation + test else "training"
-        parts[part].append(number)
+        parts[kept.get(number, part)].append(number)
     split = Split(**{name: tuple(each) for name, each in parts.items()})
     return _checked(split, len(numbers), "change data.validation or data.split_seed")
 
@@ -64,8 +69,7 @@ def split_by_lists(numbers: Sequence[str], training: Path | None, validation: Pa
     """Split pictures by lists, as `read_list` reads them.
 
     Without a list of its own, training gets all pictures that no list names; validation and test get none. Raises
-    InputError naming file and line for a picture that does not exist, and InputError for a picture in two parts and if
-    training or validation gets no picture.
+    InputError for a picture that does not exist or is in two parts, and if training or validation gets no picture.
     """
     chosen = {
         name: () if path is None else read_list(path, numbers)
@@ -92,13 +96,11 @@ def write_split(path: Path, split: Split) -> None:
 def read_split(path: Path) -> Split:
     """Read pictures.json. Raises InputError naming the file and its fault."""
     try:
-        table = json.loads(read_regular(path))
-    except OSError as error:
-        raise InputError(f"can't read {path}: {error.strerror or error}") from error
+        table = json.loads(read_bytes(path))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: {one_line(error)}") from error
-    names = ("training", "validation", "test")
-    if not isinstance(table, dict) or set(table) != set(names) or not all(_are_numbers(table[each]) for each in names):
+    names = ("training", *_HELD_OUT)
+    if not isinstance(table, dict) or set(table) != set(names) or not all(map(_are_numbers, table.values())):
         raise InputError(f"{path} is damaged: it must hold the lists {', '.join(names)}")
     try:
         return Split(**{name: tuple(table[name]) for name in names})
@@ -106,5 +108,14 @@ def read_split(path: Path) -> Split:
         raise InputError(f"{path}: {error}") from error
 
 
+def split_beside(model: Path, data: Path) -> Split | None:
+    """The split of the training that made a network of the pictures in `data`, if its files are beside the network."""
+    with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
+        if json.loads(read_regular(model.with_name("run.json")))["data"] == str(data.resolve()):
+            split = read_split(model.with_name("pictures.json"))
+            return split if split.training else None  # with none, it learned from a stream
+    return None
+
+
 def _are_numbers(values: object) -> bool:
-    return isinstance(values, Iterable) and not isinstance(values, str) and all(isinstance(e, str) for e in values)
+    return isinstance(values, list) and all(isinstance(each, str) for each in values)

@@ -24,18 +24,19 @@ from ..truth.objects import SceneTruth, read_scene, true_objects
 from .answers import PictureAnswer, Subject
 from .worst_errors import WorstErrors, worst_errors_of
 
+MIN_RADIUS = 2.0
+"""Smaller true objects are ignored [px]."""
+
 
 @dataclass(frozen=True)
 class Rules:
     """How to evaluate pictures.
 
     radius_of: radius for the mesh, and for the search for the outline that fits best. all: the network's; scene: that
-    of each picture's balls, from the sceneX.json of vm-synth. min_radius: smaller true objects are ignored [px].
-    strict: stop at the first picture that can't be used.
+    of each picture's balls, from the sceneX.json of vm-synth. strict: stop at the first picture that can't be used.
     """
 
     radius_of: str = "all"
-    min_radius: float = 2.0
     strict: bool = False
 
 
@@ -68,12 +69,12 @@ class Evaluation:
     features: FieldScores | None = None
 
     @classmethod
-    def empty(cls, subject: Subject, rules: Rules) -> Evaluation:
+    def empty(cls, subject: Subject) -> Evaluation:
         """The result for no pictures. It has scores of objects only for a Visual Mesh: the fit works on its rings."""
         classes = subject.manifest.classes
         objects = [each.name for each in classes if each.kind == "object" and subject.grid.is_visual]
-        scores = {name: ObjectScores(min_radius=rules.min_radius) for name in objects}
-        proposals = {name: ProposalScores(min_radius=rules.min_radius) for name in scores if name in subject.looks}
+        scores = {name: ObjectScores(min_radius=MIN_RADIUS) for name in objects}
+        proposals = {name: ProposalScores(min_radius=MIN_RADIUS) for name in scores if name in subject.looks}
         names = {each.name for each in classes}
         features = FieldScores() if subject.grid.is_visual and names.issuperset(CLASSES) else None
         return cls(PointScores([each.name for each in classes]), scores, proposals, features=features)
@@ -126,7 +127,7 @@ def evaluate_pictures(subject: Subject, pictures: Sequence[PictureFiles], classe
     Raises InputError for a mask color that belongs to no class, and with `strict` for any picture that can't be used.
     Raises ModelError for probabilities outside 0 to 1.
     """
-    result = Evaluation.empty(subject, rules)
+    result = Evaluation.empty(subject)
     for files in pictures:
         try:
             picture, scene = _read(files, classes, rules)

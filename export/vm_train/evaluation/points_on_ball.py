@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Mask, Number, frozen
+from vm_embedded.arrays import Floats, Mask, frozen
 from vm_embedded.detection.projection import project
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.mesh import Mesh
 
@@ -32,31 +31,6 @@ class PosedCamera:
     orientation: Orientation
     lens: Lens
     size: Size
-
-
-PAPER_CAMERA = PosedCamera(
-    Orientation.from_roll_pitch(0.9, pitch=math.radians(45.0)),
-    Equisolid(focal_length=420.0, fov=2.6, size=(1280, 1024)),
-    (1280, 1024),
-)
-"""A camera like that of the pictures of the paper's authors. It sees from the point below itself to the horizon.
-
-Of the camera in its figure, the paper gives only the size of the pictures, 1280 x 1024 px. Height and lens come from
-the pictures published with the paper's code: 0.78 to 1.2 m high, median 0.9 m; equisolid, f = 420 px, fov 1.6 to 2.6
-rad.
-"""
-
-
-class EarlySphere(Sphere):
-    """A ball with the theta of an early version of the reference: 2 asin(r / (h tan(phi) + r)).
-
-    The added r avoids the singularity of the paper's `circle_dtheta`, where the sine would exceed 1. But it makes the
-    rings near the camera's foot too dense, by (d + r) / d at distance d. The result is a peak at 0 m like the one in
-    the paper's figure (section "Precision"); our theta has no such peak.
-    """
-
-    def theta(self, n: Number, height: Number) -> Number:
-        return 2.0 * np.arcsin(self.radius / (height * np.tan(self.phi(n, height)) + self.radius))
 
 
 def centers(ball: Sphere, height: float, distance: float, bearings: Floats) -> Floats:

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 _LEAST = 0.5  # points or rings at the lower end of the axes
 _DISTANCES = np.linspace(0.0, 10.0, 51)  # [m]
 _COLORS = {3: "#1b9e77", 4: "#d95f02", 5: "#7570b3"}
-_STYLES = {"visual": "-", "hexagonal": "--", "early": ":"}
-_NAMES = {"visual": "Visual Mesh", "hexagonal": "hexagonal mesh", "early": "Visual Mesh, early widths"}
+_STYLES = {"visual": "-", "hexagonal": "--"}
+_NAMES = {"visual": "Visual Mesh", "hexagonal": "hexagonal mesh"}
 
 
 def points_figure(curves: Sequence[Curve], title: str = "") -> Figure:
@@ -41,10 +41,9 @@ def points_figure(curves: Sequence[Curve], title: str = "") -> Figure:
     for curve in curves:
         look: dict[str, Any] = {"color": _color(curve), "linestyle": _STYLES[curve.mesh], "linewidth": 1.2}
         points.plot(curve.distances, curve.mean, **look)
-        if curve.mesh != "early":  # it has our rings, and its range would hide the others'
-            rings.plot(curve.distances, curve.rings, **look)
-            low = np.maximum(curve.low, _LEAST)
-            points.fill_between(curve.distances, low, curve.high, color=_color(curve), alpha=0.13, linewidth=0)
+        rings.plot(curve.distances, curve.rings, **look)
+        low = np.maximum(curve.low, _LEAST)
+        points.fill_between(curve.distances, low, curve.high, color=_color(curve), alpha=0.13, linewidth=0)
     points.set_ylabel("points on the ball: mean, and range over bearings")
     rings.set_ylabel("rings or rows across the ball, mean over bearings")
     for axes, ticks in ((points, (1, 2, 5, 10, 20, 50, 100, 200, 500)), (rings, (1, 2, 3, 4, 5, 6, 8, 10, 15, 20))):
@@ -56,8 +55,7 @@ def points_figure(curves: Sequence[Curve], title: str = "") -> Figure:
         axes.set_ylim(bottom=_LEAST)
         axes.grid(alpha=0.25)
         axes.spines[["top", "right"]].set_visible(False)
-    present = {curve.mesh: None for curve in curves}
-    styles: list[dict[str, Any]] = [{"linestyle": _STYLES[mesh], "label": _NAMES[mesh]} for mesh in present]
+    styles: list[dict[str, Any]] = [{"linestyle": _STYLES[mesh], "label": name} for mesh, name in _NAMES.items()]
     keys = [Line2D([], [], color="black", **style) for style in styles]
     colors = {f"k = {curve.intersections:g}": _color(curve) for curve in curves}
     keys += [Line2D([], [], color=color, linewidth=4.0, label=name) for name, color in colors.items()]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vm_embedded.arrays import Floats, frozen
+from vm_embedded.arrays import Floats
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.sphere import Sphere
@@ -16,10 +16,7 @@ from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import build_mesh
 
 from ..graphs.hexagonal import HexagonalMesh, visible_hexagonal_mesh
-from .points_on_ball import BEARINGS, EarlySphere, PosedCamera, points_on_ball, rings_across, rows_across, shown_whole
-
-DISTANCES: Floats = frozen(np.linspace(0.0, 10.0, 401))
-"""Distances of the ball [m]."""
+from .points_on_ball import BEARINGS, PosedCamera, points_on_ball, rings_across, rows_across, shown_whole
 
 _MAX_DISTANCE = 20.0
 """Reach of the Visual Mesh [m], as in the reference implementation."""
@@ -29,11 +26,11 @@ _MAX_DISTANCE = 20.0
 class Curve:
     """Points of one mesh on a ball, over the ball's distance.
 
-    mesh: visual, our rings; hexagonal, the baseline; or early, rings with the widths of EarlySphere. intersections: k
-    of the Visual Mesh; a hexagonal mesh has the k of the Visual Mesh that it is compared to. count: points on screen.
-    distances (m,) [m]: on the plane, from below the camera to below the ball's center. mean, low, high (m,): points on
-    the ball over all bearings, NaN where the camera sees no complete ball. rings (m,): rings of the Visual Mesh
-    across the ball, or rows of the hexagonal mesh, averaged over all bearings.
+    mesh: visual, our rings; or hexagonal, the baseline. intersections: k of the Visual Mesh; a hexagonal mesh has the
+    k of the Visual Mesh that it is compared to. count: points on screen. distances (m,) [m]: on the plane, from below
+    the camera to below the ball's center. mean, low, high (m,): points on the ball over all bearings, NaN where the
+    camera sees no complete ball. rings (m,): rings of the Visual Mesh across the ball, or rows of the hexagonal mesh,
+    averaged over all bearings.
     """
 
     mesh: str
@@ -45,21 +42,15 @@ class Curve:
     high: Floats
     rings: Floats
 
-    def at(self, distance: float) -> tuple[float, float]:
-        """Mean number of points, and of rings or rows, at the sampled distance nearest to this one [m]."""
-        nearest = int(np.argmin(np.abs(self.distances - distance)))
-        return float(self.mean[nearest]), float(self.rings[nearest])
-
 
 def points_over_distance(
     camera: PosedCamera,
     ball: Sphere,
-    intersections: Sequence[float] = (3, 4, 5),
-    distances: Floats = DISTANCES,
+    intersections: Sequence[float],
+    distances: Floats,
     equal_at: float | None = None,
-    early: bool = False,
 ) -> list[Curve]:
-    """Curves of the Visual Mesh and of the hexagonal mesh for each of the intersections; early: also of EarlySphere.
+    """Curves of the Visual Mesh and of the hexagonal mesh for each of the intersections, at distances (m,) [m].
 
     The paper's fig:ball_distance_graph has such curves. The hexagonal mesh has as many points on screen as the Visual
     Mesh or, with `equal_at` [m], as many points on a ball at that distance. Raises GeometryError if the camera is too
@@ -70,13 +61,10 @@ def points_over_distance(
     curves = []
     for k in intersections:
         mesh = _rings_on_screen(camera, ball, k)
-        curves.append(_ring_curve("visual", mesh, camera, ball, k, seen))
+        curves.append(_ring_curve(mesh, camera, ball, k, seen))
         count = len(mesh) if equal_at is None else _equal_count(mesh, camera, ball, equal_at)
         hexagonal = visible_hexagonal_mesh(camera.lens, camera.size, count)
         curves.append(_hexagonal_curve(hexagonal, camera, ball, k, seen))
-        if early:
-            mesh = _rings_on_screen(camera, EarlySphere(ball.radius), k)
-            curves.append(_ring_curve("early", mesh, camera, ball, k, seen))
     return curves
 
 
@@ -97,10 +85,10 @@ _Seen = Sequence[tuple[float, Floats]]
 """Distances [m], each with the bearings [rad] at which the camera sees the complete ball."""
 
 
-def _ring_curve(kind: str, mesh: Mesh, camera: PosedCamera, ball: Sphere, intersections: float, seen: _Seen) -> Curve:
+def _ring_curve(mesh: Mesh, camera: PosedCamera, ball: Sphere, intersections: float, seen: _Seen) -> Curve:
     height = camera.orientation.height
     rings = [rings_across(mesh, ball, height, distance) for distance, _ in seen]
-    return _curve(kind, mesh.rays, rings, height, ball, intersections, seen)
+    return _curve("visual", mesh.rays, rings, height, ball, intersections, seen)
 
 
 def _hexagonal_curve(

@@ -45,7 +45,7 @@ def evaluate(
     """
     size = min(_CHUNK, max(-(-len(pictures) // workers), _FEWEST))
     chunks = [pictures[start : start + size] for start in range(0, len(pictures), size)]
-    result = Evaluation.empty(subject, job.rules)
+    result = Evaluation.empty(subject)
     for part, chunk in zip(_parts(job, subject, chunks, workers), chunks, strict=True):
         result += part
         for _ in chunk:

@@ -25,9 +25,9 @@ MOST = 12
 class WorstError:
     """A picture with a missed or a false object.
 
-    content: reads the bytes of the image file, which may be in a shard. rank: radius of the largest missed object, or
-    size of its box [px], or confidence of the most confident false one. center (2,) and radius [px]: of this object.
-    true, found: outlines (m, 2) [px] of all objects of the class.
+    content: reads the bytes of the image file. rank: radius of the largest missed object, or size of its box [px], or
+    confidence of the most confident false one. center (2,) and radius [px]: of this object. true, found: outlines
+    (m, 2) [px] of all objects of the class.
     """
 
     image: Path

@@ -1,1 +1,1 @@
-"""Files of other programs: TFRecord files, which it imports, and tar shards, which it writes."""
+"""Files of other programs: tar archives and TFRecord files, which vm-train imports."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ from vm_embedded.geometry.lens_files import format_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import projection_named
 
-from .tfexample import BytesList, Example, FloatList
+from ..data.picture_files import FileName
 
 KEYS = (
     "image",
@@ -39,42 +40,25 @@ class WrongUnitError(InputError):
     """The lens is in image widths instead of pixels, or the other way round. The other records will have it too."""
 
 
-@dataclass(frozen=True)
-class ExamplePicture:
-    """The files of one picture: bytes of image and mask as the Example holds them, and the text of the lens file.
-
-    suffix: of the image file.
-    """
-
-    image: bytes
-    suffix: str
-    mask: bytes
-    lens: str
-
-    def files(self, number: int) -> dict[str, bytes]:
-        """The files' contents by name. The image is last: an import writes it when the others are complete."""
-        return {
-            f"mask{number:07d}.png": self.mask,
-            f"lens{number:07d}.yaml": self.lens.encode(),
-            f"image{number:07d}{self.suffix}": self.image,
-        }
-
-
-def picture_of(example: Example, renaming: Mapping[str, str], normalized: bool) -> ExamplePicture:
-    """The picture in an Example.
+def picture_of(example: Any, number: int, renaming: Mapping[str, str], normalized: bool) -> dict[FileName, bytes]:
+    """The files of the picture in an Example: image and mask as it holds them, and the lens file. The image is last.
 
     renaming: the Example's names of features, by our names in KEYS. normalized: the Example gives focal length, center
     and k for an image of width 1, not in pixels. Raises WrongUnitError if the focal length is in the other unit, and
     another VisualMeshError, naming the feature, for anything else that makes the Example unusable.
     """
-    features = _Features(example, {key: renaming.get(key, key) for key in KEYS})
+    features = _Features(example.features.feature, {key: renaming.get(key, key) for key in KEYS})
     image, suffix, size = features.picture("image", cv2.IMREAD_COLOR)
     mask, mask_suffix, mask_size = features.picture("mask", cv2.IMREAD_UNCHANGED)
     if mask_suffix != ".png":
         raise InputError("mask is not a PNG file")
     if mask_size != size:
         raise InputError(f"mask has {_pixels(mask_size)}, but the image has {_pixels(size)}")
-    return ExamplePicture(image, suffix, mask, features.lens(size[0], normalized))
+    return {
+        FileName("mask", f"{number:07d}", ".png"): mask,
+        FileName("lens", f"{number:07d}", ".yaml"): features.lens(size[0], normalized).encode(),
+        FileName("image", f"{number:07d}", suffix): image,
+    }
 
 
 def _pixels(size: tuple[int, int]) -> str:
@@ -88,7 +72,7 @@ class _Features:
     The methods take our names and raise a VisualMeshError that names the feature.
     """
 
-    example: Example
+    example: Mapping[str, Any]
     names: Mapping[str, str]
 
     def __post_init__(self) -> None:
@@ -103,16 +87,16 @@ class _Features:
             )
 
     def text(self, key: str) -> bytes:
-        feature = self.example[self.names[key]]
-        if not isinstance(feature, BytesList) or len(feature.values) != 1:
+        values: tuple[bytes, ...] = tuple(self.example[self.names[key]].bytes_list.value)
+        if len(values) != 1:
             raise InputError(f"{key} is not one string of bytes")
-        return feature.values[0]
+        return values[0]
 
     def floats(self, key: str, count: int) -> tuple[float, ...]:
-        feature = self.example[self.names[key]]
-        if not isinstance(feature, FloatList) or len(feature.values) != count:
+        values = tuple(self.example[self.names[key]].float_list.value)
+        if len(values) != count:
             raise InputError(f"{key} is not {count} floats")
-        return feature.values
+        return values
 
     def picture(self, key: str, flags: int) -> tuple[bytes, str, tuple[int, int]]:
         """The bytes of an image file, its suffix, and its width and height [px]. flags: of cv2.imdecode."""

@@ -1,192 +1,50 @@
-"""Examples, the payloads of TFRecord files, read without TensorFlow or protobuf.
-
-An Example is a protobuf message that maps names to lists of bytes, floats or whole numbers.
-"""
+"""Examples, the payloads of TFRecord files: protobuf messages that map names to lists of bytes, floats or integers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, text_format
+from google.protobuf.message import DecodeError
 
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, one_line
 
+_SCHEMA = """
+name: "vm_train/example.proto" package: "vm_train" syntax: "proto3"
+message_type { name: "BytesList" field { name: "value" number: 1 label: LABEL_REPEATED type: TYPE_BYTES } }
+message_type { name: "FloatList" field { name: "value" number: 1 label: LABEL_REPEATED type: TYPE_FLOAT } }
+message_type { name: "Int64List" field { name: "value" number: 1 label: LABEL_REPEATED type: TYPE_INT64 } }
+message_type {
+  name: "Feature"
+  field { name: "bytes_list" number: 1 type_name: ".vm_train.BytesList" oneof_index: 0 }
+  field { name: "float_list" number: 2 type_name: ".vm_train.FloatList" oneof_index: 0 }
+  field { name: "int64_list" number: 3 type_name: ".vm_train.Int64List" oneof_index: 0 }
+  oneof_decl { name: "kind" }
+}
+message_type {
+  name: "Features"
+  field { name: "feature" number: 1 label: LABEL_REPEATED type_name: ".vm_train.Features.FeatureEntry" }
+  nested_type {
+    name: "FeatureEntry"
+    options { map_entry: true }
+    field { name: "key" number: 1 type: TYPE_STRING }
+    field { name: "value" number: 2 type_name: ".vm_train.Feature" }
+  }
+}
+message_type { name: "Example" field { name: "features" number: 1 type_name: ".vm_train.Features" } }
+"""
+"""TensorFlow's example.proto and feature.proto, as a FileDescriptorProto."""
 
-@dataclass(frozen=True)
-class BytesList:
-    """Values of a feature of type bytes."""
+_POOL = descriptor_pool.DescriptorPool()
+_POOL.Add(text_format.Parse(_SCHEMA, descriptor_pb2.FileDescriptorProto()))
 
-    values: tuple[bytes, ...]
-
-
-@dataclass(frozen=True)
-class FloatList:
-    """Values of a feature of type float; the file stores 32 bits of each."""
-
-    values: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Int64List:
-    """Values of a feature of type int64."""
-
-    values: tuple[int, ...]
-
-
-Feature = BytesList | FloatList | Int64List
-Example = Mapping[str, Feature]
-
-
-_MOST = 2**22
-"""Most values in an Example; a field counts as _FIELD values, as it takes so much more memory than a number."""
-
-_FIELD = 4
-
-_VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
-"""Wire types of protobuf."""
+Example = message_factory.GetMessageClass(_POOL.FindMessageTypeByName("vm_train.Example"))
+"""The class of these messages; its `features.feature` maps names to messages with one of three lists."""
 
 
-def parse_example(payload: bytes) -> Example:
-    """The features of an Example by name, without those that have no list.
-
-    It follows the rules of protobuf: lists of numbers may be packed, unknown fields are ignored, and the parts of a
-    message are merged. Raises InputError if the payload is not an Example, or has more than _MOST values.
-    """
-    example: dict[str, Feature] = {}
-    budget = _Budget()
-    for entry in _inner(_joined(_inner(memoryview(payload), 1, budget)), 1, budget):
-        name = _text(_joined(_inner(entry, 1, budget)[-1:]))
-        try:
-            feature = _feature(_joined(_inner(entry, 2, budget)), budget)
-        except InputError as error:
-            raise InputError(f"{name!r}: {error}") from error
-        if feature is not None:
-            example[name] = feature
-    return example
-
-
-class _Budget:
-    """The values that an Example may still have."""
-
-    def __init__(self) -> None:
-        self._left = _MOST
-
-    def take(self, count: int) -> None:
-        """Raises InputError if there are not so many left."""
-        self._left -= count
-        if self._left < 0:
-            raise _no_example(f"it has more than {_MOST} values")
-
-
-def _feature(message: memoryview, budget: _Budget) -> Feature | None:
-    lists = [_inner(message, number, budget) for number in (1, 2, 3)]
-    if sum(bool(each) for each in lists) > 1:
-        raise _no_example("a feature has lists of several kinds")
-    texts, floats, integers = (_joined(each) for each in lists)
-    if lists[0]:
-        return BytesList(tuple(bytes(each) for each in _inner(texts, 1, budget)))
-    if lists[1]:
-        return FloatList(_floats(floats, budget))
-    if lists[2]:
-        return Int64List(_integers(integers, budget))
-    return None
-
-
-def _floats(message: memoryview, budget: _Budget) -> tuple[float, ...]:
-    parts = []
-    for number, wire, value in _fields(message, budget):
-        if number == 1:
-            if not isinstance(value, memoryview) or wire == _FIXED64 or len(value) % 4:
-                raise _no_example("a list of floats holds something else")
-            budget.take(len(value) // 4)
-            parts.append(value)
-    return tuple(np.frombuffer(b"".join(parts), dtype="<f4").tolist())
-
-
-def _integers(message: memoryview, budget: _Budget) -> tuple[int, ...]:
-    values: list[int] = []
-    for number, wire, value in _fields(message, budget):
-        if number != 1:
-            continue
-        if isinstance(value, int):
-            values.append(value)
-        elif wire == _BYTES:
-            at = 0
-            while at < len(value):
-                each, at = _varint(value, at)
-                budget.take(1)
-                values.append(each)
-        else:
-            raise _no_example("a list of whole numbers holds something else")
-    return tuple(each - 2**64 if each >= 2**63 else each for each in values)
-
-
-def _inner(message: memoryview, wanted: int, budget: _Budget) -> list[memoryview]:
-    """All values of a field of type bytes, text or message."""
-    found = []
-    for number, wire, value in _fields(message, budget):
-        if number == wanted:
-            if wire != _BYTES or isinstance(value, int):
-                raise _no_example(f"field {number} has wire type {wire}")
-            found.append(value)
-    return found
-
-
-def _joined(parts: list[memoryview]) -> memoryview:
-    """A message from its parts: to merge messages, protobuf concatenates their bytes."""
-    return parts[0] if len(parts) == 1 else memoryview(b"".join(parts))
-
-
-def _text(value: memoryview) -> str:
+def parse_example(payload: bytes) -> Any:
+    """The Example in a payload. Raises InputError if it holds none."""
     try:
-        return str(value, "utf-8")
-    except UnicodeDecodeError as error:
-        raise _no_example("the name of a feature is not text") from error
-
-
-def _fields(message: memoryview, budget: _Budget) -> Iterator[tuple[int, int, int | memoryview]]:
-    """Number, wire type and value of each field. The value is a number for _VARINT, otherwise bytes."""
-    at = 0
-    while at < len(message):
-        budget.take(_FIELD)
-        tag, at = _varint(message, at)
-        number, wire = tag >> 3, tag & 7
-        if not 1 <= number < 2**29:
-            raise _no_example(f"field number {number} is out of range")
-        if wire == _VARINT:
-            value, at = _varint(message, at)
-            yield number, wire, value
-            continue
-        if wire == _BYTES:
-            size, at = _varint(message, at)
-        elif wire in (_FIXED32, _FIXED64):
-            size = 4 if wire == _FIXED32 else 8
-        else:
-            raise _no_example(f"unknown wire type {wire}")
-        if size > len(message) - at:
-            raise _no_example("it is cut short")
-        yield number, wire, message[at : at + size]
-        at += size
-
-
-def _varint(message: memoryview, at: int) -> tuple[int, int]:
-    """The number below 2^64 at position `at`, and the position after it."""
-    value = 0
-    for shift in range(0, 70, 7):
-        if at >= len(message):
-            raise _no_example("it is cut short")
-        byte = message[at]
-        at += 1
-        value |= (byte & 127) << shift
-        if byte < 128:
-            break
-    else:
-        raise _no_example("a number is too long")
-    if value >= 2**64:
-        raise _no_example("a number is too large")
-    return value, at
-
-
-def _no_example(reason: str) -> InputError:
-    return InputError(f"not an Example: {reason}")
+        return Example.FromString(payload)
+    except DecodeError as error:
+        raise InputError(f"not an Example: {one_line(error)}") from error

@@ -7,20 +7,21 @@ A record is the length of its payload (uint64), the length's checksum (uint32), 
 from __future__ import annotations
 
 import gzip
+import os
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, BinaryIO
 
+import google_crc32c
+
 from vm_embedded.errors import InputError, one_line
 from vm_embedded.files import open_regular, read_up_to
 
-from ..data.picture_files import LARGEST_FILE
-from .crc32c import masked_crc32c
-from .tfexample import Example, parse_example
+_LARGEST = 2**26
+"""Most bytes of a record, with an image and a mask: protobuf may need 15 times as much memory."""
 
-_LARGEST = 2 * LARGEST_FILE  # bytes of a record, with an image and a mask
 _HEADER = 12  # bytes
 
 
@@ -28,47 +29,34 @@ _HEADER = 12  # bytes
 class Record:
     """One record of a file.
 
-    checksum: of the payload, masked, from the file. position: bytes of the file on disk that are read so far.
+    where: file and number, for messages. checksum: of the payload, masked, from the file. share: of the file that is
+    read so far, 0 to 1.
     """
 
-    path: Path
-    number: int
-    payload: bytes
+    where: str
+    content: bytes
     checksum: int
-    position: int
+    share: float
 
     @property
-    def where(self) -> str:
-        """File and record number, for messages."""
-        return f"{self.path}: record {self.number}"
-
-    def check(self) -> None:
-        """Raise InputError if the payload does not match its checksum."""
-        if masked_crc32c(self.payload) != self.checksum:
-            raise InputError(f"{self.where} is damaged: the checksum of its content is wrong")
-
-    def example(self) -> Example:
-        """The Example in the checked payload. Raises InputError naming file and record.
-
-        The check takes about 3 ms per megabyte, far less than decoding the pictures.
-        """
-        self.check()
-        try:
-            return parse_example(self.payload)
-        except InputError as error:
-            raise InputError(f"{self.where}: {error}") from error
+    def payload(self) -> bytes:
+        """The checked content. Raises InputError if it does not match its checksum."""
+        if masked_crc32c(self.content) != self.checksum:
+            raise InputError("it is damaged: the checksum of its content is wrong")
+        return self.content
 
 
 def read_records(path: Path) -> Iterator[Record]:
     """The records of a TFRecord file, plain or gzip, one in memory at a time.
 
-    The checksums of lengths are always checked; `Record.check` and `Record.example` check those of payloads. So records
-    after a damaged payload can be read, but not after a damaged length. An empty file has no records. Raises InputError
-    naming file, record and fault.
+    The checksums of lengths are always checked, those of payloads when they are taken. So records after a damaged
+    payload can be read, but not after a damaged length. An empty file has no records. Raises InputError naming file,
+    record and fault.
     """
     number = 0
     try:
         with open_regular(path) as file:
+            size = os.fstat(file.fileno()).st_size
             stream: IO[bytes] = gzip.GzipFile(fileobj=file) if _is_gzip(file) else file  # type: ignore[assignment]
             while header := read_up_to(stream, _HEADER):
                 length = _length(path, number, header)
@@ -76,7 +64,8 @@ def read_records(path: Path) -> Iterator[Record]:
                 end = read_up_to(stream, 4)
                 if len(end) < 4:
                     raise _truncated(path, number)
-                yield Record(path, number, payload, int.from_bytes(end, "little"), file.tell())
+                share = file.tell() / size
+                yield Record(f"{path}: record {number}", payload, int.from_bytes(end, "little"), share)
                 number += 1
     except EOFError as error:  # gzip raises it for a file that is cut short
         raise _truncated(path, number) from error
@@ -84,6 +73,12 @@ def read_records(path: Path) -> Iterator[Record]:
         raise InputError(f"{path}: record {number}: the gzip file is damaged: {one_line(error)}") from error
     except OSError as error:
         raise InputError(f"can't read {path}: {error.strerror or error}") from error
+
+
+def masked_crc32c(data: bytes) -> int:
+    """The checksum in TFRecord files: the CRC-32C rotated by 15 bits, plus a constant."""
+    crc: int = google_crc32c.value(data)
+    return ((crc >> 15 | crc << 17) + 0xA282EAD8) & 0xFFFFFFFF
 
 
 def _is_gzip(file: BinaryIO) -> bool:

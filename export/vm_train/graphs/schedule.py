@@ -10,8 +10,7 @@ import numpy as np
 _VALIDATED = 8  # pictures in a batch of the validation
 
 _ORDER, _AUGMENTATION = 1, 3
-"""Keep random numbers of different uses apart that begin with the same seed; 2 is `_DRAWS` of learning/trainer.py, and
-4 is `_STREAM` of streamed.py."""
+"""Keep random numbers of different uses apart that begin with the same seed; 2 is `_DRAWS` of learning/trainer.py."""
 
 
 @dataclass(frozen=True)

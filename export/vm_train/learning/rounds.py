@@ -285,7 +285,7 @@ def _remaining_batches(run: TrainingRun, training_round: int, done: int, validat
 
 @contextmanager
 def _saved_on_error(folder: Path, save: Callable[[], None]) -> Iterator[None]:
-    """Save the state when a picture or shard ends the training, and tell how to resume.
+    """Save the state when a picture ends the training, and tell how to resume.
 
     A training that diverged would do so again, so it is not saved.
     """

@@ -29,14 +29,13 @@ from vm_embedded.output.result_files import make_folder
 
 from ..data.split import read_split, write_split
 from ..graphs.loading import PictureGraphs
-from ..graphs.streamed import StreamedGraphs, StreamSource
 from .configuration import TrainConfiguration
 from .folder_access import check_unused, description
 from .selection import class_weights, selection_shares
 from .start import Start
 from .training_data import TrainingData
 
-_FORMAT = 5
+_FORMAT = 6
 _STARTS = {".pt": "start.pt", ".onnx": "start.onnx"}
 """Copies of the network to begin with, by the suffix of its file."""
 
@@ -99,7 +98,7 @@ class TrainingRun:
         shares = selection_shares(self.configuration.training.selection, self.counts, self.objects)
         return float(shares @ self.counts) / self.data.counted
 
-    def scheduled_graphs(self) -> PictureGraphs | StreamedGraphs:
+    def scheduled_graphs(self) -> PictureGraphs:
         """The graphs of the training's batches. Raises InputError if a picture is missing."""
         return self.data.scheduled_graphs(self.configuration)
 
@@ -110,13 +109,11 @@ class TrainingRun:
     def provenance(self) -> dict[str, str]:
         """Where a network of this training comes from, for its manifest."""
         recipe, data = self.configuration.training, self.data
-        training = data.split.training if data.source is None else data.source.shards
-        count = data.pictures_per_epoch
-        used = hashlib.sha256(json.dumps([training, data.split.validation]).encode()).hexdigest()
+        used = hashlib.sha256(json.dumps([data.split.training, data.split.validation]).encode()).hexdigest()
         return {
             "made_by": f"vm-train {__version__}",
             "data": printable(data.folder.name),
-            "training_pictures": str(count) if data.source is None else f"{count} an epoch, streamed",
+            "training_pictures": str(data.pictures_per_epoch),
             "validation_pictures": str(len(data.split.validation)),
             "pictures_sha256": used,
             "configuration_sha256": self.configuration_sha256,
@@ -161,15 +158,14 @@ def read_run(folder: Path) -> TrainingRun:
     """Read a training that was begun. Raises InputError, also if its files were changed since."""
     with description(folder, _FORMAT) as content:
         counts = np.array(list(content["points"].values()), dtype=np.int64)
-        pictures, unpacked, stream = Path(content["data"]), content["unpacked"], content["source"]
+        pictures, unpacked = Path(content["data"]), content["unpacked"]
         configuration_sha256 = content["configuration_sha256"]
         started = content["start"]
         start_name, start_sha256 = (None, None) if started is None else (str(started["file"]), started["sha256"])
-        source = None if stream is None else StreamSource(**(stream | {"shards": tuple(stream["shards"])}))
     configuration = read_sections(TrainConfiguration, folder / "train.toml")
     start = None if start_name is None else Start.load(folder / start_name)
     split = read_split(folder / "pictures.json")
-    data = TrainingData(pictures, split, None if unpacked is None else folder / unpacked, source)
+    data = TrainingData(pictures, split, None if unpacked is None else folder / unpacked)
     run = TrainingRun(folder, data, configuration, counts, start)
     if start is not None and start.sha256 != start_sha256:
         raise InputError(f"{start.path} was changed since the training began: begin another one")
@@ -190,7 +186,6 @@ def _description(run: TrainingRun) -> dict[str, Any]:
         "data": str(data.folder),
         "unpacked": None if data.unpacked is None else _relative(data.unpacked, run.folder),
         "configuration_sha256": run.configuration_sha256,
-        "source": None if data.source is None else asdict(data.source),
         "start": None if run.start is None else {"file": _start_name(run.start), "sha256": run.start.sha256},
         "points": dict(zip(names, run.counts.tolist(), strict=True)),
     }

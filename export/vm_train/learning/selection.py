@@ -2,7 +2,7 @@
 
 The paper balances the classes by selecting equally many points of each. Its second and third rounds select points by
 the errors of the networks before. Weighting instead takes all points and has the same mean gradient with less noise;
-docs/experiments.md compares them.
+benchmarks/experiments/mesh-network.md compares them.
 
 A random number decides whether a point is selected. So the classes are balanced over the whole set and not within each
 batch, where the rarest class may have a single point or none.

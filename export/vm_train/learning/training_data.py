@@ -1,4 +1,4 @@
-"""The pictures of a training: in a folder or a stream, for training or validation, read in batches."""
+"""The pictures of a training, for training or validation, read in batches."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from ..graphs.graph_cache import GraphCache
 from ..graphs.graph_recipe import GraphRecipe
 from ..graphs.loading import PictureGraphs
 from ..graphs.schedule import Batch, Item, schedule
-from ..graphs.streamed import StreamedGraphs, StreamedItem, StreamSource, assign_lanes
 from .configuration import TrainConfiguration
 from .recipe import Recipe
 
@@ -31,18 +30,17 @@ class TrainingData:
     """Which pictures a training uses, and for what.
 
     folder: of the pictures. split: numbers of those for training, validation and test. unpacked: folder for decoded
-    pictures and views, or None for no cache. source: the stream of training pictures; None if they are in the folder.
+    pictures and views, or None for no cache.
     """
 
     folder: Path
     split: Split
     unpacked: Path | None = None
-    source: StreamSource | None = None
 
     @property
     def pictures_per_epoch(self) -> int:
         """Number of training pictures in an epoch."""
-        return len(self.split.training) if self.source is None else self.source.epoch
+        return len(self.split.training)
 
     @property
     def counted(self) -> int:
@@ -53,13 +51,11 @@ class TrainingData:
         """All batches of a round, counted from 1."""
         seed = (recipe.seed, training_round)
         validation = len(self.split.validation)
-        batches = schedule(seed, recipe.epochs, recipe.batch, self.pictures_per_epoch, validation, recipe.looks)
-        return batches if self.source is None else assign_lanes(batches, seed, self.source)
+        return schedule(seed, recipe.epochs, recipe.batch, self.pictures_per_epoch, validation, recipe.looks)
 
-    def scheduled_graphs(self, configuration: TrainConfiguration) -> PictureGraphs | StreamedGraphs:
+    def scheduled_graphs(self, configuration: TrainConfiguration) -> PictureGraphs:
         """The graphs of the items in `batches`. Raises InputError if a picture is missing."""
-        graphs = self.graphs((*self.split.training, *self.split.validation), configuration)
-        return graphs if self.source is None else StreamedGraphs(self.source, graphs)
+        return self.graphs((*self.split.training, *self.split.validation), configuration)
 
     def graphs(self, numbers: Sequence[str], configuration: TrainConfiguration) -> PictureGraphs:
         """The graphs of some pictures of the folder. Raises InputError if a picture is missing."""
@@ -80,17 +76,12 @@ class TrainingData:
     def count_points(self, configuration: TrainConfiguration) -> npt.NDArray[np.int64]:
         """Number (C,) of each class's points in `counted` training pictures, without augmentation.
 
-        These pictures are spread over the folder, or are the first ones of one lane of the stream. Raises InputError.
+        These pictures are spread over the folder. Raises InputError.
         """
-        if self.source is None:
-            items = [Item(int(each)) for each in np.linspace(0, self.pictures_per_epoch - 1, self.counted)]
-        else:
-            order = (configuration.training.seed, 0)
-            items = [StreamedItem(0, None, order, 0, place) for place in range(self.counted)]
         graphs = self.scheduled_graphs(configuration)
         counts = np.zeros(len(configuration.classes.colors), dtype=np.int64)
-        for item in items:
-            labels = graphs[item].labels
+        for position in np.linspace(0, self.pictures_per_epoch - 1, self.counted):
+            labels = graphs[Item(int(position))].labels
             counts += np.bincount(labels[labels >= 0], minlength=len(counts))
         return counts
 

@@ -32,7 +32,7 @@ def test_models_that_are_none_are_refused(tmp_path):
     one_complaint(unknown, "'baller'", "did you mean 'ball'")
 
 
-@pytest.mark.parametrize("name", ["image.jpg", "lens.yaml", "model.onnx", "script.toml", "vm.toml"])
+@pytest.mark.parametrize("name", ["image.jpg", "lens.yaml", "model.onnx", "vm.toml"])
 def test_a_file_that_may_never_end_is_refused(name, tmp_path):
     path = tmp_path / name
     os.mkfifo(path)
@@ -41,7 +41,6 @@ def test_a_file_that_may_never_end_is_refused(name, tmp_path):
         "image.jpg": (tmp_path, *pose),
         "lens.yaml": (IMAGES[0], "--lens", path),
         "model.onnx": (IMAGES[0], "--model", path, *pose),
-        "script.toml": ("--camera", f"fault:{path}", "--check-config"),
         "vm.toml": (IMAGES[0], "--config", path),
     }
     one_complaint(run(*commands[name], code=1, timeout=60), f"{path}: not a regular file")

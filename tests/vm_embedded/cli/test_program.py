@@ -282,3 +282,12 @@ def test_an_interrupt_that_a_program_leaves_to_others_has_a_status_of_its_own(ca
 
     assert main() == 130
     assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("program", ["vm-detect", "vm-ros", "vm-doctor"])
+def test_help_is_short_and_help_all_has_every_option(program):
+    usual, all_of_them = (run(program, option).stdout for option in ("--help", "--help-all"))
+    assert 20 <= len(re.findall(r"^  +-", usual, re.MULTILINE)) <= 34  # 30, --help, --help-all, --version, --completion
+    for hidden in ("--camera-max-age-ms", "--min-inside"):
+        assert hidden not in usual
+        assert hidden in all_of_them

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from tests.drawn_scenes import IMAGES, MODEL
-from tests.messages import kind_of
 from tests.programs import BIN
 from vm_embedded.output.readable_line import to_readable_line
 
@@ -46,8 +45,6 @@ def test_a_live_camera_prints_a_line_for_each_frame_and_no_states(folder):
         assert re.match(r"frame \d+  (degraded  |stopping  )?(no objects|\d+ ball)", line), line
     messages = map(json.loads, run(folder, *options, "--json").stdout.splitlines())
     assert {each["type"] for each in messages} == {"frame", "state"}
-    of_ros = run(folder, *options, "--output-format", "ros").stdout.splitlines()
-    assert {kind_of(json.loads(each)) for each in of_ros} == {"ros", "ros_state"}
 
 
 def test_make_demo_prints_lines_for_people_into_a_pipe(tmp_path):

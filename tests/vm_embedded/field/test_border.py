@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.field.border import find_border
+from vm_embedded.field.border import _hull, _hulls, find_border
 
 from .ground import behind, ground, inside_of, mesh, turned
 
@@ -86,3 +86,15 @@ def test_it_is_convex(noise):
     steps = np.diff(find_border(ground(places, labels)), axis=0)
     turns = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
     assert (turns > -1e-6).all()
+
+
+@given(seed=st.integers(0, 1000), count=st.integers(3, 40))
+def test_each_hull_is_that_of_all_places_but_some_corners_of_those_before(seed, count):
+    random = np.random.default_rng(seed)
+    azimuths = np.sort(random.uniform(-1.2, 1.2, count))
+    places = random.uniform(2.0, 6.0, count)[:, None] * np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+    left, before = set(range(count)), None
+    for corners in _hulls(places):
+        left -= set(before or ()) - set(corners)
+        assert corners == _hull(list(map(complex, *places.T)), sorted(left))
+        before = corners

@@ -60,7 +60,7 @@ def test_one_line_has_no_crossing():
 
 def post(x, y):
     place = np.array([x, y], dtype=float)
-    return Upright("post", place, float(np.hypot(*place)), np.array([1.0, 0.0, 0.0]), np.zeros(2), 0.1, 0.9)
+    return Upright("post", 0.9, place, float(np.hypot(*place)), np.array([1.0, 0.0, 0.0]), np.zeros(2), 0.1)
 
 
 def test_posts_at_a_goals_width_are_a_goal_with_its_left_post_first():

@@ -35,7 +35,7 @@ def near(lines=(), circle=None, angle=0.0, seed=None):
 def drawn(*args, **keywords):
     """Those of these points that are on lines."""
     points = near(*args, **keywords)
-    return points.part(points.weights > LEAST)
+    return points.part(np.flatnonzero(points.weights > LEAST))
 
 
 def pieces_of(*args, **keywords):
@@ -80,7 +80,7 @@ def test_points_that_see_no_line_end_a_piece():
 @given(st.lists(st.integers(-9, 9), max_size=30), st.floats(0.5, 20.0))
 def test_the_best_stretch_has_the_largest_sum_and_the_others_are_beside_it(numbers, least):
     values = np.array(numbers, dtype=np.float64)
-    found = _best_stretches(values, least, np.inf)
+    found = _best_stretches(values, np.zeros(len(values), np.intp), least, np.inf)
     sums = [values[first : last + 1].sum() for first, last, _ in found]
     assert sums == pytest.approx([each for _, _, each in found])
     assert all(each >= least for each in sums)
@@ -92,8 +92,8 @@ def test_the_best_stretch_has_the_largest_sum_and_the_others_are_beside_it(numbe
 
 def test_a_long_row_of_values_below_zero_is_in_no_stretch():
     values = np.array([5.0, -1.0, 5.0, -2.0, -2.0, 5.0])
-    assert [each[:2] for each in _best_stretches(values, 1.0, 5.0)] == [(0, 5)]
-    assert sorted(each[:2] for each in _best_stretches(values, 1.0, 3.0)) == [(0, 2), (5, 5)]
+    assert [each[:2] for each in _best_stretches(values, np.zeros(6, np.intp), 1.0, 5.0)] == [(0, 5)]
+    assert sorted(each[:2] for each in _best_stretches(values, np.zeros(6, np.intp), 1.0, 3.0)) == [(0, 2), (5, 5)]
 
 
 def test_all_lines_share_two_directions():
@@ -117,6 +117,13 @@ def test_the_circle_is_found(angle, x, y, radius):
 def test_scattered_points_are_no_circle():
     points = drawn(seed=3)
     assert find_circle(points, np.arange(len(points))) is None
+
+
+def test_a_few_points_are_no_circle():
+    points = drawn(circle=(np.array([2.0, 0.0]), 0.75))
+    few = np.linspace(0, len(points) - 1, 17).astype(np.intp)
+    assert find_circle(points, np.arange(len(points))) is not None
+    assert find_circle(points.part(few), np.arange(len(few))) is None
 
 
 def test_the_same_points_have_the_same_circle():

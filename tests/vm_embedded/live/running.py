@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from tests.messages import checked, read_message
+from tests.soak import failing_camera
 from vm_embedded.live.control import ask
 
 COMMAND = Path(sys.executable).parent / "vm-detect"
@@ -78,9 +79,10 @@ class Running:
         return status, time.monotonic() - started
 
 
-def arguments(tmp_path, *options):
-    """A command line whose sockets are in a folder of the test."""
-    return [str(COMMAND), "--status-socket", str(tmp_path / "control"), "--max-distance", "6", *map(str, options)]
+def arguments(tmp_path, *options, faults=()):
+    """A command line whose sockets are in a folder of the test. With faults, its camera is synthetic and has them."""
+    command = failing_camera.command(faults) if faults else [str(COMMAND)]
+    return [*command, "--status-socket", str(tmp_path / "control"), "--max-distance", "6", *map(str, options)]
 
 
 def counts(tmp_path):
@@ -89,10 +91,10 @@ def counts(tmp_path):
 
 
 @contextmanager
-def running(tmp_path, *options, env=None, **more):
+def running(tmp_path, *options, faults=(), env=None, **more):
     """A process that ends with the block, whatever happens in it."""
     process = subprocess.Popen(
-        arguments(tmp_path, *options),
+        arguments(tmp_path, *options, faults=faults),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, **(env or {})},

@@ -11,6 +11,7 @@ import pytest
 
 from tests.messages import read_message
 from tests.preloaded import run_preloaded
+from tests.soak.failing_camera import Fault
 from tests.vm_embedded.live.running import DEMO, arguments, counts, running
 from vm_embedded.cameras.synthetic import Motion
 from vm_embedded.network.bundled import model_path
@@ -126,9 +127,7 @@ def test_hangup_refuses_files_that_may_never_end(tmp_path):
 
 def test_a_second_signal_ends_it_at_once(tmp_path):
     kept = tmp_path / "recordings"
-    source = tmp_path / "script.toml"
-    source.write_text('faults = [{ kind = "hang", at = 1.0, seconds = 60.0 }]\n')
-    with running(tmp_path, "--camera", f"fault:{source}", "--recorder-folder", kept) as found:
+    with running(tmp_path, "--recorder-folder", kept, faults=[Fault("hang", at=1.0, seconds=60.0)]) as found:
         found.wait_for_state("camera_lost")
         for _ in range(2):
             found.process.send_signal(signal.SIGTERM)

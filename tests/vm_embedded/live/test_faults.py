@@ -5,9 +5,9 @@ import threading
 
 import pytest
 
+from tests.soak.failing_camera import KINDS, Fault
 from tests.soak.faults import QUICK, SMALL, is_fresh
 from tests.vm_embedded.live.running import running
-from vm_embedded.cameras.fault import KINDS
 
 STATES = {
     "unplug": "camera_lost",
@@ -26,11 +26,6 @@ STATES = {
 """What state each fault leads to, if it lasts longer than a camera may be silent."""
 
 
-def script(path, text):
-    path.write_text(text)
-    return ("--camera", f"fault:{path}")
-
-
 def check_frames(found):
     """No frame that was reported is stale."""
     for each in found.frames:
@@ -40,8 +35,7 @@ def check_frames(found):
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_fault_is_seen_and_got_over(tmp_path, kind):
-    source = script(tmp_path / "script.toml", f'faults = [{{ kind = "{kind}", at = 2.5, seconds = 1.2 }}]\n')
-    with running(tmp_path, *source, *QUICK, *SMALL) as found:
+    with running(tmp_path, *QUICK, *SMALL, faults=[Fault(kind, at=2.5, seconds=1.2)]) as found:
         found.wait_for_state("ok")
         found.wait_for_state(STATES[kind])
         found.wait_for_state("ok")
@@ -51,9 +45,8 @@ def test_each_fault_is_seen_and_got_over(tmp_path, kind):
 
 @pytest.mark.long
 def test_threads_that_hang_too_often_end_it_with_a_status_that_asks_for_a_new_start(tmp_path):
-    faults = ", ".join(f'{{ kind = "hang", at = {2 + 0.5 * at}, seconds = 60.0 }}' for at in range(30))
-    source = script(tmp_path / "script.toml", f"faults = [{faults}]\n")
-    with running(tmp_path, *source, *QUICK, *SMALL) as found:
+    faults = [Fault("hang", 2.0 + 0.5 * at, seconds=60.0) for at in range(30)]
+    with running(tmp_path, *QUICK, *SMALL, faults=faults) as found:
         assert found.process.wait(60.0) == 75
         assert threading.active_count() < 50
 
@@ -61,7 +54,7 @@ def test_threads_that_hang_too_often_end_it_with_a_status_that_asks_for_a_new_st
 SLOW = """
 import sys
 
-if sys.orig_argv[1].endswith("vm-detect"):
+if sys.orig_argv[1].endswith("failing_camera.py"):
     import time
     from vm_embedded.detection.detector import Detector
 
@@ -81,10 +74,9 @@ def test_no_frame_says_that_there_is_no_camera(tmp_path):
     """The camera is lost while its last frame is processed."""
     (tmp_path / "sitecustomize.py").write_text(SLOW)
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
-    faults = ", ".join(f'{{ kind = "hang", at = {at}.0, seconds = 0.5 }}' for at in (1, 3, 5))
-    source = script(tmp_path / "script.toml", f"faults = [{faults}]\n")
+    faults = [Fault("hang", at, seconds=0.5) for at in (1.0, 3.0, 5.0)]
     options = ("--camera-lost-ms", 60, "--camera-retry-ms", 20, "--camera-max-age-ms", 2000)
-    with running(tmp_path, *source, *options, env={"PYTHONPATH": path}) as found:
+    with running(tmp_path, *options, faults=faults, env={"PYTHONPATH": path}) as found:
         for _ in range(3):
             found.wait_for_state("camera_lost")
         found.stop()

@@ -1,7 +1,5 @@
 """What stops vm-detect at the start, and how it says so."""
 
-import asyncio
-import io
 import json
 import shutil
 import signal
@@ -12,11 +10,7 @@ import pytest
 from tests.preloaded import run_preloaded
 from tests.programs import run_program
 from tests.vm_embedded.live.running import COMMAND, DEMO, arguments, running
-from vm_embedded.cameras.camera import CameraSettings
-from vm_embedded.cameras.fault import FaultScript
-from vm_embedded.live.configuration import Configuration, StatusSettings, read_configuration
-from vm_embedded.live.daemon import Daemon
-from vm_embedded.live.log import EventLog
+from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.bundled import model_path
 
 
@@ -29,7 +23,6 @@ def test_what_can_never_work_ends_it_at_the_start_with_a_status_of_its_own(tmp_p
         (("--camera", "synthetic", "--explain"), "--explain works only with files"),
         (("--camera", "/dev/video-none"), "needs a lens"),
         (("--config", tmp_path / "none.toml"), "none.toml"),
-        (("--camera", "fault:none.toml"), "can't read fault script none.toml"),
         (("--camera", "http://"), "not a valid address"),
         (("--camera", "synthetic", "--output-unix", tmp_path / "no" / "folder"), "No such file"),
         (("--camera", "synthetic", "--output-file", tmp_path), "directory"),
@@ -163,15 +156,3 @@ def test_a_running_detector_is_asked_although_its_vm_toml_has_got_an_error(tmp_p
     assert done.returncode == 0
     assert json.loads(done.stdout)["state"] == "ok"
     assert "did you mean 'fps'" in done.stderr
-
-
-def test_the_start_reads_the_script_of_a_camera_once(tmp_path, monkeypatch):
-    path = tmp_path / "script.toml"
-    path.write_text('source = "synthetic"\n')
-    read, seen = FaultScript.read, []
-    monkeypatch.setattr(FaultScript, "read", lambda path: seen.append(path) or read(path))
-    configuration = Configuration(
-        camera=CameraSettings(source=f"fault:{path}"), status=StatusSettings(socket=str(tmp_path / "control"))
-    )
-    asyncio.run(Daemon.prepare(lambda: configuration, EventLog(io.StringIO())))
-    assert seen == [path]

@@ -10,9 +10,9 @@ from urllib.request import Request, urlopen
 
 import pytest
 
+from tests.soak.failing_camera import Fault
 from tests.soak.faults import QUICK
 from tests.vm_embedded.live.running import running
-from tests.vm_embedded.live.test_faults import script
 from tests.waiting import wait
 from vm_embedded.live import status_page
 
@@ -122,8 +122,8 @@ def test_the_addresses_of_the_documentation_answer(tmp_path):
 @pytest.mark.long
 def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_camera(tmp_path, browser):
     where = free_address()
-    source = script(tmp_path / "script.toml", 'faults = [{ kind = "unplug", at = 20.0, seconds = 3.0 }]\n')
-    with running(tmp_path, *source, *QUICK, "--status-page", where) as found:
+    unplugged = Fault("unplug", at=20.0, seconds=3.0)
+    with running(tmp_path, *QUICK, "--status-page", where, faults=[unplugged]) as found:
         found.wait_for_state("ok")
         browser.get(f"http://{where}/")
 
@@ -142,7 +142,7 @@ def test_the_page_shows_state_rates_and_a_moving_picture_and_survives_a_lost_cam
         wait(lambda: browser.execute_script(MARK).startswith("640:"))
         assert moves()
         wait(lambda: "/s" in text("now"))
-        rate = float(text("now").split("frames answered")[1].split("/s")[0])
+        rate = float(text("now").split("frame rate")[1].split("/s")[0])
         assert rate > 5.0
         wait(lambda: "ball" in text("found"))
         wait(lambda: browser.find_elements("css selector", "#map .ball"))
@@ -196,9 +196,7 @@ def test_frames_get_four_times_the_time_of_previews(monkeypatch):
     async def send(_):
         return None
 
-    answerer = SimpleNamespace(
-        configuration=SimpleNamespace(status=SimpleNamespace(picture_fps=5.0, page="")), detector=None
-    )
+    answerer = SimpleNamespace(configuration=SimpleNamespace(status=SimpleNamespace(page="")), detector=None)
     page = status_page.StatusPage(answerer, *4 * (dict,))
     page._views = SimpleNamespace(latest="a frame", preview=send)
 

@@ -1,5 +1,6 @@
 """A system that gives no more threads, as with `ulimit -u`: the daemon ends in order."""
 
+import json
 import subprocess
 import sys
 
@@ -19,20 +20,20 @@ def refused(thread):
     start(thread)
 
 threading.Thread.start = refused
-from vm_embedded.cli.detect import main
+from tests.soak.failing_camera import main
 sys.exit(main(sys.argv[2:]))
 """
-"""vm-detect that gets no more threads once a file exists."""
+"""vm-detect that gets no more threads once a file exists, with a synthetic camera that has faults."""
 
 
 @pytest.fixture
 def start(tmp_path):
-    """Starts vm-detect with options; its file is tmp_path/full."""
+    """Starts vm-detect with faults and options; its file is tmp_path/full."""
     processes = []
 
-    def start(*options):
+    def start(*options, faults=()):
         options = ("--status-socket", tmp_path / "control", "--max-distance", "6", *options)
-        command = [sys.executable, "-c", NO_THREADS, str(tmp_path / "full"), *map(str, options)]
+        command = [sys.executable, "-c", NO_THREADS, str(tmp_path / "full"), json.dumps(faults), *map(str, options)]
         processes.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
         return Running(processes[-1])
 
@@ -43,7 +44,7 @@ def start(tmp_path):
 
 
 def test_it_ends_in_order(start, tmp_path):
-    found = start("--camera", "synthetic", "--recorder-folder", tmp_path / "recordings")
+    found = start("--recorder-folder", tmp_path / "recordings")
     found.wait_for_state("ok")
     (tmp_path / "full").touch()
     assert found.stop()[0] == 0
@@ -54,9 +55,7 @@ def test_it_ends_in_order(start, tmp_path):
 
 @pytest.mark.long
 def test_a_camera_that_can_not_be_opened_again_ends_it_with_a_status_that_asks_for_a_new_start(start, tmp_path):
-    script = tmp_path / "script.toml"
-    script.write_text('faults = [{ kind = "hang", at = 3.0, seconds = 600.0 }]\n')
-    found = start("--camera", f"fault:{script}", *QUICK, *SMALL)
+    found = start(*QUICK, *SMALL, faults=[("hang", 3.0, 600.0)])
     found.wait_for_state("ok")
     (tmp_path / "full").touch()
     assert found.process.wait(60.0) == 75

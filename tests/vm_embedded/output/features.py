@@ -35,7 +35,7 @@ def upright(view, name, x, y, width):
     toward = np.array([*position[0], -view.height])
     distance = float(np.linalg.norm(toward))
     pixel = view.plane_pixels(position)[0]
-    return Upright(name, position[0], distance, toward / distance, pixel, width, 0.91)
+    return Upright(name, 0.91, position[0], distance, toward / distance, pixel, width)
 
 
 def segment(view, *ends):

@@ -1,5 +1,6 @@
 """The binary form, read by the reader in the documentation."""
 
+import math
 import re
 import socket
 import threading
@@ -15,8 +16,8 @@ from tests.vm_embedded.live.running import running
 from tests.vm_embedded.output.features import demo_frame, full, scene
 from vm_embedded import Tracker
 from vm_embedded.cameras.camera import Shot
-from vm_embedded.output.binary_form import HEADER, RECORDS, VERSION, to_binary
-from vm_embedded.output.messages import STATES, live_message, state_message, to_json_line
+from vm_embedded.output.binary_form import HEADER, LAYOUT, RECORDS, to_binary
+from vm_embedded.output.messages import STATES, live_frame, state_message, to_json_line
 
 PAGE = (Path(__file__).parents[3] / "docs" / "daemon.md").read_text()
 PATH = "/run/vm-detect/lines.sock"
@@ -58,19 +59,18 @@ def frame_message(make, tracked=True):
     field = make and make(detections.observation.view)
     shot = Shot(image, now - 0.02, arrived=now - 0.01)
     found = replace(detections, field=field)
-    return checked(live_message(2**32 + 812, "degraded", shot, Tracker().update(found, 1.0) if tracked else found, now))
+    found = Tracker().update(found, 1.0) if tracked else found
+    return checked(live_frame(2**32 + 812, "degraded", shot, found, now).as_dict())
 
 
 def assert_same(record, expected, names):
-    """The fields of a record are the numbers of the JSON form."""
+    """The fields of a record are the numbers of the JSON form, under the same names."""
     for name in record.dtype.names:
         value = expected["track"][name.removeprefix("track_")] if name.startswith("track_") else expected[name]
-        if name == "track":
-            assert record[name] == value["id"] > 0
-        elif name == "class":
+        if name == "class":
             assert names[record[name]] == value
         elif name == "kind":
-            assert chr(record[name]) == value
+            assert "LTX"[record[name]] == value
         else:
             np.testing.assert_allclose(record[name], np.array(value, float), rtol=1e-6)
 
@@ -79,13 +79,13 @@ def assert_same(record, expected, names):
 def test_the_reader_of_the_documentation_reads_all_that_a_frame_has(tmp_path, capsys, make):
     message = frame_message(make)
     got = read(tmp_path, state_message("starting", ""), message)
-    assert (got["kind"], STATES[got["state"]], got["has_field"]) == (1, "degraded", 1)
-    assert (got["t"], got["wall"], got["frame"]) == (message["t"], message["wall"], 812)
-    assert got["points"] == message["points"]
-    assert got["age_ms"] == pytest.approx(message["age_ms"], abs=1e-3)
-    assert got["latency_ms"] == pytest.approx(message["latency_ms"], abs=1e-3)
-    assert got["total_ms"] == pytest.approx(message["timing_ms"]["total"], abs=1e-3)
-    found, field, names = got["found"], message["field"], got["text"].splitlines()
+    header, found, field, names = got["header"], got["found"], message["field"], got["names"]
+    assert (header["is_frame"], STATES[header["state"]], header["field"], header["frame"]) == (1, "degraded", 1, 812)
+    assert (header["t"], header["wall"], header["points"]) == (message["t"], message["wall"], message["points"])
+    for name in ("age_ms", "latency_ms"):
+        assert header[name] == pytest.approx(message[name], abs=1e-3)
+    times = [each for each in header["timing_ms"].tolist() if not math.isnan(each)]
+    assert times == pytest.approx(list(message["timing_ms"].values()), abs=1e-3)
     assert names == ["ball", "post", "robot"]
     groups = {name: field[name] for name in ("posts", "robots", "lines", "crossings")}
     groups |= {"detections": message["detections"], "circle": [field["circle"]]}
@@ -93,47 +93,39 @@ def test_the_reader_of_the_documentation_reads_all_that_a_frame_has(tmp_path, ca
         assert len(found[name]) == len(expected) > 0
         for record, each in zip(found[name], expected, strict=True):
             assert_same(record, each, names)
-    assert found["goals"].tolist() == [(0, 1)]
-    np.testing.assert_allclose(found["border"]["point"], field["border"]["points"], rtol=1e-6)
-    np.testing.assert_allclose(found["border"]["pixel"], field["border"]["pixels"], rtol=1e-6)
+    assert found["goals"]["goals"].tolist() == [[0, 1]]
+    for name in ("points", "pixels"):
+        np.testing.assert_allclose(found["border"][name], field["border"][name], rtol=1e-6)
     assert "ball" in capsys.readouterr().out
 
 
 def test_a_state_has_its_reason_and_no_records(tmp_path):
     message = state_message("camera_lost", "no new frame for 1.0 s - 10 µs late")
     got = read(tmp_path, message)
-    assert (got["kind"], STATES[got["state"]], got["text"]) == (0, "camera_lost", message["reason"])
-    assert (got["t"], got["wall"]) == (message["t"], message["wall"])
+    header = got["header"]
+    assert (header["is_frame"], STATES[header["state"]], got["text"]) == (0, "camera_lost", message["reason"])
+    assert (header["t"], header["wall"]) == (message["t"], message["wall"])
     assert not any(len(each) for each in got["found"].values())
 
 
 def test_a_network_without_classes_of_the_field_has_no_field(tmp_path):
     got = read(tmp_path, frame_message(None))
-    assert got["has_field"] == 0
+    assert got["header"]["field"] == 0
     assert {name for name, records in got["found"].items() if len(records)} == {"detections"}
 
 
 def test_an_object_without_a_track_has_the_number_0(tmp_path):
     (record,) = read(tmp_path, frame_message(None, tracked=False))["found"]["detections"]
-    assert record["track"] == 0
+    assert record["track_id"] == 0
     for name in ("track_position", "track_velocity", "track_position_error", "track_velocity_error"):
         assert np.isnan(record[name]).all()
 
 
-def test_a_pixel_that_the_lens_does_not_see_is_nan():
+def test_a_pixel_that_the_lens_does_not_see_is_nan(tmp_path):
     message = frame_message(scene)
     message["field"]["robots"] = [message["field"]["robots"][0] | {"pixel": [None, None]}]
-    size = to_binary(message)
-    assert np.isnan(np.frombuffer(size, RECORDS["robots"], 1, _offset(message, "robots"))["pixel"]).all()
-
-
-def _offset(message, wanted):
-    """Bytes before the records of a kind."""
-    counts = HEADER.unpack_from(to_binary(message))[12:]
-    names = list(RECORDS)
-    return HEADER.size + sum(
-        RECORDS[name].itemsize * count for name, count in zip(names[: names.index(wanted)], counts, strict=False)
-    )
+    (robot,) = read(tmp_path, message)["found"]["robots"]
+    assert np.isnan(robot["pixel"]).all()
 
 
 def test_a_full_frame_is_a_third_of_its_line():
@@ -141,25 +133,9 @@ def test_a_full_frame_is_a_third_of_its_line():
     assert 3 * len(to_binary(message)) < len(to_json_line(message)) + 1000
 
 
-def test_a_text_that_is_too_long_is_cut(tmp_path):
-    got = read(tmp_path, state_message("degraded", "x" * 70_000), state_message("ok", "y" * 70_000))
-    assert got["text"] == "y" * 65_535
-
-
-def test_the_tables_of_the_documentation_are_the_layout(tmp_path):
-    assert VERSION == 3
-    assert read(tmp_path, state_message("ok", ""))["TYPES"] == RECORDS
-    section = PAGE.split("### Binary form")[1].split("\n## ")[0]
-    sizes = {name: int(size) for name, size in re.findall(r"^\| `(\w+)` \| (\d+) \|", section, re.MULTILINE)}
-    assert sizes == {name: dtype.itemsize for name, dtype in RECORDS.items()}
-    rows = re.findall(r"^\| (\d+) \| (\w+)(?: x (\d+))? \|", section, re.MULTILINE)
-    widths = {"u8": 1, "u16": 2, "u32": 4, "f32": 4, "f64": 8}
-    offset = 0
-    for at, kind, count in rows:
-        assert int(at) == offset
-        offset += widths[kind] * int(count or 1)
-    assert offset == HEADER.size
-    assert all(f"{number} `{name}`" in section for number, name in enumerate(STATES))
+def test_the_layout_of_the_documentation_is_that_of_the_detector(tmp_path):
+    found = read(tmp_path, state_message("ok", ""))
+    assert (found["HEADER"], found["TYPES"], found["NUMBER"]) == (HEADER, RECORDS, LAYOUT)
 
 
 def test_a_detector_sends_lines_and_the_binary_form_at_once(tmp_path):
@@ -173,6 +149,6 @@ def test_a_detector_sends_lines_and_the_binary_form_at_once(tmp_path):
         exec(reader(path), variables)
         stopper.join()
         numbers = {each["frame"] for each in found.frames}
-    assert variables["kind"] == 0
-    assert STATES[variables["state"]] == "stopping"
+    assert variables["header"]["is_frame"] == 0
+    assert STATES[variables["header"]["state"]] == "stopping"
     assert numbers

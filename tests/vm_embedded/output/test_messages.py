@@ -7,12 +7,12 @@ import pytest
 
 from tests.messages import checked
 from tests.vm_embedded.output.features import NOTHING, demo_frame, full, scene
-from vm_embedded.output.messages import frame_fields, state_message, to_json_line, to_ros
+from vm_embedded.output.messages import to_json_line
 
 
 def fields_of(detections):
     """The fields of a frame; in a message, they are as its schema says."""
-    fields = frame_fields(detections)
+    fields = detections.as_dict()
     checked({"frame": 0, "source": "image.jpg", "stamp": None, **json.loads(to_json_line(fields))})
     return fields
 
@@ -51,10 +51,3 @@ def test_a_pixel_that_the_lens_does_not_see_is_null(detections):
     post = replace(made.posts[0], pixel=made.posts[0].pixel + float("nan"))
     fields = fields_of(replace(detections, field=replace(made, posts=(post,), goals=())))
     assert json.loads(to_json_line(fields))["field"]["posts"][0]["pixel"] == [None, None]
-
-
-def test_a_state_in_the_names_of_ros_has_no_empty_array():
-    message = to_ros(state_message("camera_lost", "no new frame for 1.0 s"), "base_footprint")
-    assert set(message) == {"state", "reason", "header"}
-    assert (message["state"], message["reason"]) == ("camera_lost", "no new frame for 1.0 s")
-    assert message["header"]["frame_id"] == "base_footprint"

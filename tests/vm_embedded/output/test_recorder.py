@@ -10,6 +10,7 @@ from tests.drawn_scenes import MODEL
 from tests.messages import read_message
 from tests.preloaded import run_preloaded
 from tests.programs import run_program
+from tests.soak.failing_camera import Fault
 from tests.vm_embedded.live.running import COMMAND, arguments, running
 from vm_embedded.files import locked_folder
 
@@ -85,11 +86,10 @@ def count_found(folder):
 @pytest.mark.long
 def test_a_detector_that_is_stopped_finishes_its_recording(tmp_path):
     """Also while reads of the camera hang."""
-    source, kept = tmp_path / "script.toml", tmp_path / "recordings"
-    source.write_text('faults = [{ kind = "hang", at = 8.0, seconds = 100.0 }]\n')
+    kept = tmp_path / "recordings"
     retry = ("--camera-lost-ms", 500, "--camera-open-ms", 5000, "--camera-retry-ms", 10)
-    options = ("--camera", f"fault:{source}", "--recorder-folder", kept, *retry)
-    with running(tmp_path, *LARGE[:4], *options) as found:
+    hang = Fault("hang", at=8.0, seconds=100.0)
+    with running(tmp_path, *LARGE[:4], "--recorder-folder", kept, *retry, faults=[hang]) as found:
         found.wait(lambda: len(found.frames) > 3)
         found.wait_for_state("camera_lost")
         promised = count_promised(ask_to_record(tmp_path))

@@ -56,13 +56,6 @@ def test_motion_goes_on_for_as_long_as_it_may_and_then_stands():
         poses.at(1.15)
 
 
-def test_without_interpolation_the_newest_pose_counts():
-    poses = PoseBuffer(PoseSettings(interpolate=False))
-    for at in (1.0, 1.02):
-        poses.add(at, Orientation.from_roll_pitch(0.6, 0.0, at))
-    assert poses.at(1.01).pitch == pytest.approx(1.02)
-
-
 def test_there_is_no_pose_before_the_first_and_none_long_before_it():
     poses = PoseBuffer(PoseSettings())
     with pytest.raises(StalePoseError, match="no pose"):

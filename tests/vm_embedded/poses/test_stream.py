@@ -65,11 +65,11 @@ def errors_of(found):
     return np.array(errors)
 
 
-def measured(tmp_path, *options):
+def measured(tmp_path):
     """Errors of a hundred balls while the camera turns."""
     port = free_port()
     source = ("--camera", f"synthetic:{TURN}", "--pose-source", f"udp:127.0.0.1:{port}")
-    with running(tmp_path, *source, *options) as found, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
+    with running(tmp_path, *source) as found, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sending:
         sender = Sender(lambda line: sending.sendto(line, ("127.0.0.1", port)))
         sender.start()
         found.wait(lambda: len(errors_of(found)) >= 100)
@@ -81,11 +81,9 @@ def measured(tmp_path, *options):
 
 @pytest.mark.long
 def test_a_ball_is_in_its_place_while_the_camera_turns_fast(tmp_path):
-    interpolated = np.median(measured(tmp_path))
-    newest = np.median(measured(tmp_path, "--no-pose-interpolate"))
-    assert interpolated < 0.02
-    assert newest > 3.0 * interpolated
-    print(f"interpolated {100 * interpolated:.2f} %, newest pose {100 * newest:.2f} % of the distance")
+    error = np.median(measured(tmp_path))
+    assert error < 0.02
+    print(f"{100 * error:.2f} % of the distance")
 
 
 def test_poses_that_stop_are_stale_and_nothing_is_reported(tmp_path):

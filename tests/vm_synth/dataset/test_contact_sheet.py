@@ -102,10 +102,10 @@ def test_a_sheet_too_large_for_a_file_is_refused():
 
 
 def test_preview_writes_beside_the_pictures(folder, capsys):
-    assert main(["preview", str(folder), "--count", "4", "--columns", "3", "--width", "96"]) == 0
+    assert main(["preview", str(folder), "--count", "4"]) == 0
     assert capsys.readouterr().out == f"{folder / 'preview.jpg'}: 4 pictures\n"
     made = cv2.imread(str(folder / "preview.jpg"))
-    assert made.shape[1] == 6 + 3 * (96 + 6)
+    assert made.shape[1] == 6 + 4 * (320 + 6)
     assert not list(folder.glob("*.part"))
     (folder / "preview.jpg").unlink()
 
@@ -159,7 +159,7 @@ def test_wrong_commands_are_one_line(folder, capsys, arguments, text):
     assert said.count("\n") == 1
 
 
-@pytest.mark.parametrize("arguments", [["--count", "0"], ["--width", "x"], ["--first", "1", "--seed", "2"]])
+@pytest.mark.parametrize("arguments", [["--count", "0"], ["--count", "x"], ["--first", "1", "--seed", "2"]])
 def test_wrong_options_are_refused(folder, arguments):
     with pytest.raises(SystemExit) as found:
         main(["preview", str(folder), *arguments])

@@ -16,6 +16,7 @@ import pytest
 from tests.folders import contents
 from tests.programs import BIN, heed_interrupts, run_program
 from tests.vm_export.looks import look_checkpoint
+from vm_embedded.network.bundled import model_path
 from vm_export.change_model import change_looks
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
@@ -101,14 +102,14 @@ def test_calibration_counts_all_objects_that_the_scores_count(evaluated):
 def looking(tmp_path_factory):
     """A model file with a close look of random weights."""
     path = tmp_path_factory.mktemp("looking") / "looking.onnx"
-    change_looks(MODEL, path, [look_checkpoint(seed=1)])
+    change_looks(model_path("ball"), path, [look_checkpoint(seed=1)])
     return path
 
 
 @pytest.mark.long
 def test_a_close_look_s_proposals_have_scores_of_their_own(capsys, looking, data, tmp_path):
     out = tmp_path / "out"
-    options = ("--radius-of", "scene", "--max-proposals", 7, "--min-confidence", 0)
+    options = ("--radius-of", "scene", "--min-confidence", 0)
     done = run(looking, data, "-o", out, "--workers", 2, *options)
     assert "proposals for class ball: " in done.stdout
     assert "proposals.svg" in {path.name for path in (out / "plots").iterdir()}

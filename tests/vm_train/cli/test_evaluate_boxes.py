@@ -66,11 +66,12 @@ def test_an_object_radius_changes_what_the_detector_finds(boxes, tmp_path):
     folder = shutil.copytree(boxes, tmp_path / "boxes")
     (folder / "object.toml").write_text("radius = 0.25\n")
     given, read = (
-        run("--boxes", each, "ball", *options, "--workers", 1).stdout.replace(str(each), "")
+        run("--boxes", each, "ball", *options, "--workers", 1)
         for each, options in ((boxes, ("--object-radius", "0.25")), (folder, ()))
     )
-    assert given == read
-    assert "100 %" not in given.split("recall")[1].splitlines()[1]
+    assert given.stdout.replace(str(boxes), str(folder)) == read.stdout
+    assert "100 %" not in read.stdout.split("recall")[1].splitlines()[1]
+    assert "object radius 0.25 m, from object.toml" in read.stderr
 
 
 def test_without_lens_the_close_look_is_scored(without_lenses, tmp_path):

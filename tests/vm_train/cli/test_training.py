@@ -150,10 +150,13 @@ def test_a_reader_that_leaves_loses_no_training(data, configuration, tmp_path):
 
 
 @pytest.mark.long
-def test_two_processes_have_the_same_loss_curve(whole, data, configuration, tmp_path):
+def test_two_processes_have_the_same_loss_curve_on_imported_pictures(whole, data, configuration, tmp_path):
+    subprocess.run(["tar", "-cf", tmp_path / "data.tar", "-C", data.parent, data.name], check=True)
+    unpacked = tmp_path / "data"
+    run("import", tmp_path / "data.tar", unpacked)
     command = [sys.executable, "-m", "torch.distributed.run", "--nproc-per-node=2", "--master-port=0", "--standalone"]
     done = subprocess.run(
-        [*command, "-m", "vm_train", data, "-o", tmp_path / "run", "--config", configuration, "--workers", "0"],
+        [*command, "-m", "vm_train", unpacked, "-o", tmp_path / "run", "--config", configuration, "--workers", "0"],
         capture_output=True,
         text=True,
         timeout=240,

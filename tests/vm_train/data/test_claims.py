@@ -2,7 +2,6 @@
 
 import gzip
 import io
-import resource
 import subprocess
 import sys
 import tarfile
@@ -12,15 +11,12 @@ import numpy as np
 import pytest
 import torch
 
-from tests.vm_train.data.test_pictures import write_pictures
-from tests.vm_train.formats.test_tfrecord import masked
+from tests.vm_train.formats.tfrecord_writer import framed, masked
 from vm_embedded.errors import InputError
 from vm_export.checkpoint import Checkpoint
-from vm_train.data import array_files, tar_members
+from vm_train.data import array_files
 from vm_train.data.array_files import read_arrays
-from vm_train.data.shard_stream import stream
-from vm_train.formats.tfexample import parse_example
-from vm_train.formats.tfrecord import read_records
+from vm_train.data.picture_files import LARGEST_FILE
 
 GIB = 2**30
 _ALLOWED = 512 * 2**20
@@ -30,26 +26,19 @@ _READ = f"""
 import resource, sys
 from pathlib import Path
 from vm_embedded.errors import InputError
-from vm_train.data.shard_index import open_shards
-from vm_train.data.shard_stream import stream
-from vm_train.formats.tfrecord import read_records
-def index(path):
-    return [each.raw() for each in open_shards(Path(path))]
-def records(path):
-    return [each.number for each in read_records(Path(path))]
-read = {{"stream": lambda path: list(stream([path])), "index": index, "records": records}}[sys.argv[1]]
+from vm_train.formats.importing import import_pictures
 used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (used + {_ALLOWED},) * 2)
 try:
-    read(sys.argv[2])
+    import_pictures([sys.argv[1]], Path(sys.argv[1] + "-out"), {{}}, False, True, lambda share: None)
 except InputError as error:
     print(error)
 """
 
 
-def refusal_in_little_memory(how, path):
-    """What a reader says in a process that may not take more than _ALLOWED."""
-    done = subprocess.run([sys.executable, "-c", _READ, how, path], capture_output=True, text=True, timeout=300)
+def refusal_in_little_memory(path):
+    """What an import says in a process that may not take more than _ALLOWED."""
+    done = subprocess.run([sys.executable, "-c", _READ, path], capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr[-2000:]
     assert path.name in done.stdout
     return done.stdout
@@ -90,90 +79,54 @@ def zeros(count):
     return gzip.compress(bytes(2**20)) * (count // 2**20)
 
 
-@pytest.mark.parametrize("how", ["stream", "index"])
 @pytest.mark.parametrize("make", [sparse_shard, old_sparse_shard])
-def test_a_sparse_member_of_gigabytes_is_refused(make, how, tmp_path):
-    assert "sparse" in refusal_in_little_memory(how, make(tmp_path / "a.tar"))
+def test_a_sparse_member_of_gigabytes_is_refused(make, tmp_path):
+    assert "sparse" in refusal_in_little_memory(make(tmp_path / "a.tar"))
 
 
-@pytest.mark.parametrize("how", ["stream", "index"])
-@pytest.mark.parametrize("size", [tar_members.LARGEST_FILE + 1, 6 * GIB, 10**18])
-def test_a_member_larger_than_a_picture_can_be_is_refused(size, how, tmp_path):
+@pytest.mark.parametrize("size", [LARGEST_FILE + 1, 6 * GIB, 10**18])
+def test_a_member_larger_than_a_picture_can_be_is_refused(size, tmp_path):
     path = tmp_path / "a.tar"
     path.write_bytes(header("0.jpg", size) + bytes(1024))
-    assert f"0.jpg has {size} bytes; at most {tar_members.LARGEST_FILE} are allowed" in refusal_in_little_memory(
-        how, path
-    )
+    assert f"0.jpg has {size} bytes; at most {LARGEST_FILE} are allowed" in refusal_in_little_memory(path)
 
 
 def test_a_member_of_gigabytes_in_a_gzip_of_megabytes_is_refused(tmp_path):
     path = written(tmp_path / "a.tar.gz", gzip.compress(header("0.jpg", GIB)), zeros(GIB), zeros(2**20))
     assert path.stat().st_size < 2 * 2**20
-    assert "0.jpg has" in refusal_in_little_memory("stream", path)
+    assert "0.jpg has" in refusal_in_little_memory(path)
 
 
 @pytest.mark.parametrize("kind", [tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_LONGLINK])
-@pytest.mark.parametrize("how", ["stream", "index"])
-def test_headers_of_gigabytes_are_refused(kind, how, tmp_path):
-    """In a gzip they are there; in a plain file they are only claimed."""
-    head = header("name", GIB, kind)
-    parts = [gzip.compress(head), zeros(GIB), zeros(2**20)] if how == "stream" else [head, bytes(1024)]
-    path = written(tmp_path / "a.tar", *parts)
-    assert "headers of a member have more than" in refusal_in_little_memory(how, path)
+def test_headers_of_gigabytes_are_refused(kind, tmp_path):
+    path = written(tmp_path / "a.tar", gzip.compress(header("name", GIB, kind)), zeros(GIB), zeros(2**20))
+    assert "headers of a member have more than" in refusal_in_little_memory(path)
 
 
-@pytest.mark.parametrize("how", ["stream", "index"])
-def test_headers_of_headers_do_not_end_in_an_endless_recursion(how, tmp_path):
+def test_headers_of_headers_do_not_end_in_an_endless_recursion(tmp_path):
     path = tmp_path / "a.tar"
     path.write_bytes(header("name", 0, tarfile.XHDTYPE) * 5000 + header("0.jpg", 0) + bytes(1024))
-    assert "can't be read" in (said := refusal_in_little_memory(how, path)) or "damaged" in said
+    assert "can't be read" in refusal_in_little_memory(path)
 
 
-@pytest.mark.parametrize("how", ["stream", "index"])
 @pytest.mark.parametrize("size", ["-512", "-1536", "9" * 18, "9" * 30])
-def test_sizes_that_lead_back_or_nowhere_are_refused(size, how, tmp_path):
+def test_sizes_that_lead_back_or_nowhere_are_refused(size, tmp_path):
     path = tmp_path / "a.tar"
     path.write_bytes(header("0.jpg", 0) + header("readme", 0, pax={"size": size}) + header("1.jpg", 0) + bytes(1024))
-    assert "damaged" in (said := refusal_in_little_memory(how, path)) or "can't be read" in said
-
-
-def test_many_files_of_one_picture_are_not_collected(tmp_path):
-    member = gzip.compress(header("0.jpg", 2**26))
-    path = written(tmp_path / "a.tar.gz", *[member, zeros(2**26)] * 12, zeros(2**20))
-    assert "two files for one part of picture 0" in refusal_in_little_memory("stream", path)
-
-
-def test_pictures_that_wait_to_be_shuffled_are_limited_in_bytes(tmp_path, monkeypatch):
-    parts = [header(f"{n}{end}", 2**10) + bytes(2**10) for n in range(9) for end in (".jpg", ".mask.png", ".lens.yaml")]
-    path = tmp_path / "a.tar"
-    path.write_bytes(b"".join(parts) + bytes(1024))
-    whole = [each.number for each in stream([path], (1,), 100)]
-    assert sorted(whole) == [str(n) for n in range(9)]
-    monkeypatch.setattr("vm_train.data.shard_stream._BUFFER_BYTES", 6 * 2**10)
-    found = stream([path], (1,), 100)
-    first = next(found).number
-    assert first in "012"
-    assert sorted([first, *(each.number for each in found)]) == sorted(whole)
+    assert "can't be read" in refusal_in_little_memory(path)
 
 
 def test_a_record_of_gigabytes_in_a_gzip_of_kilobytes_is_refused(tmp_path):
     length = (2**31 - 1).to_bytes(8, "little")
     path = written(tmp_path / "a.tfrecord", gzip.compress(length + masked(length)), zeros(GIB))
-    assert "record 0 has 2147483647 bytes" in refusal_in_little_memory("records", path)
+    assert "record 0 has 2147483647 bytes" in refusal_in_little_memory(path)
 
 
-@pytest.mark.parametrize("field", [b"\x0a\x00", b"\x15\x00\x00\x00\x00"])
-def test_an_example_has_a_limited_number_of_values(field):
-    with pytest.raises(InputError, match="values"):
-        parse_example(b"".join([b"\x0a" + _varint(len(field) * 1_100_000), field * 1_100_000]))
-
-
-def _varint(value):
-    made = bytearray()
-    while value > 127:
-        made.append(value & 127 | 128)
-        value >>= 7
-    return bytes([*made, value])
+def test_a_record_may_have_so_many_bytes_that_protobuf_needs_no_gigabytes(tmp_path):
+    """Two bytes for each of its values, which take 15 times as much memory."""
+    payload = b"\x0a\x82\x80\x80\x04" + b"\x0a\x00" * (2**22 + 1)
+    path = written(tmp_path / "a.tfrecord", framed(payload))
+    assert "record 0: lacks image" in refusal_in_little_memory(path)
 
 
 def test_a_compressed_checkpoint_is_refused(tmp_path):
@@ -209,25 +162,6 @@ def test_compressed_arrays_may_have_a_limited_size(tmp_path, monkeypatch):
         read_arrays(path)
     np.savez(path, a=np.zeros(2**21, np.uint8))  # not compressed: the file is as large
     assert len(read_arrays(path)["a"]) == 2**21
-
-
-def test_vm_train_checks_a_shard_of_holes_in_little_memory(tmp_path):
-    (tmp_path / "data").mkdir()
-    shard = sparse_shard(tmp_path / "data" / "a.tar")
-    write_pictures(tmp_path)
-    command = [sys.executable, "-m", "vm_train", "check", shard.parent]
-    limit = lambda: resource.setrlimit(resource.RLIMIT_DATA, (8 * GIB, 8 * GIB))  # noqa: E731
-    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, timeout=120)
-    assert done.returncode == 1
-    assert "sparse" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert list(read_records(_empty(tmp_path))) == []
-
-
-def _empty(folder):
-    path = folder / "empty"
-    path.touch()
-    return path
 
 
 @pytest.mark.parametrize("fault", ["encrypted", "damaged"])

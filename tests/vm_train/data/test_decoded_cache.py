@@ -15,7 +15,6 @@ from vm_train.data import decoded_cache as module
 from vm_train.data.classes import Classes
 from vm_train.data.decoded_cache import MAGIC, DecodedCache, decoded_size, read_through_cache, remove_entries
 from vm_train.data.pictures import find_pictures, read_picture
-from vm_train.formats.shards import write_shards
 
 from .test_pictures import CLASSES, write_pictures
 
@@ -121,14 +120,6 @@ def test_the_entries_and_what_killed_processes_left_are_removed(files, kept):
     (kept.folder / "2.raw").touch()
     remove_entries(kept.folder, MAGIC)
     assert not kept.folder.exists()
-
-
-def test_pictures_of_a_shard_are_kept_too(files, kept, tmp_path):
-    write_shards([files], tmp_path / "shards", 1, lambda: None)
-    (packed,) = find_pictures(tmp_path / "shards")
-    read_through_cache(packed, CLASSES, kept)
-    same(kept.get(packed, CLASSES), read_picture(files, CLASSES))
-    assert kept.get(files, CLASSES) is None  # it is of other files
 
 
 def test_without_room_it_goes_on_and_says_so(files, kept, monkeypatch):

@@ -43,6 +43,14 @@ def test_the_order_of_pictures_does_not_matter(numbers, seed):
     assert parts(numbers) == parts(numbers[::-1])
 
 
+def test_pictures_that_were_held_out_stay_held_out():
+    earlier = split_by_seed(NUMBERS, 0.1, 0.1, 1)
+    split = split_by_seed(NUMBERS, 0.1, 0.0, 0, earlier)
+    assert split.test == earlier.test
+    assert set(earlier.validation) < set(split.validation)
+    assert split_by_seed(NUMBERS, 0.1, 0.0, 1, earlier).validation == earlier.validation
+
+
 def test_another_seed_gives_another_split():
     assert split_by_seed(NUMBERS, 0.1, 0.0, 0) != split_by_seed(NUMBERS, 0.1, 0.0, 1)
 

@@ -87,7 +87,7 @@ def test_scores_of_checkpoints_and_model_files_agree(models, files):
 
 
 def test_the_drawn_balls_are_found_where_they_are(models):
-    result = Evaluation.empty(models["onnx"], Rules())
+    result = Evaluation.empty(models["onnx"])
     files = find_pictures(FOLDER)
     for each, (picture, scene) in zip(files, drawn_pictures(), strict=True):
         result.count(each, picture, scene, models["onnx"].answer(picture), MANIFEST)

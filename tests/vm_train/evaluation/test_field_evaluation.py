@@ -84,7 +84,7 @@ def test_confidences_of_posts_and_robots_reach_their_scores(result):
 
 def test_parts_add_up(files, result):
     parts = [evaluate_pictures(REPORTING, each, NAMED, Rules()) for each in (files[:1], files[1:])]
-    total = Evaluation.empty(REPORTING, Rules()) + parts[0] + parts[1]
+    total = Evaluation.empty(REPORTING) + parts[0] + parts[1]
     assert as_json(total, 0.5)["field"] == as_json(result, 0.5)["field"]
 
 
@@ -118,7 +118,7 @@ def test_summary_and_report_have_their_tables(result):
     ids=["without the class robot", "hexagonal"],
 )
 def test_other_networks_have_no_scores_of_field_features(network):
-    empty = Evaluation.empty(network, Rules())
+    empty = Evaluation.empty(network)
     assert (empty + empty).features is None
     assert as_json(empty, 0.5)["field"] == {}
     assert "field" not in as_csv(empty, 0.5)

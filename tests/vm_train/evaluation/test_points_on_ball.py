@@ -5,20 +5,13 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from benchmarks.mesh_pictures import PAPER_CAMERA, EarlySphere
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
-from vm_train.evaluation.points_on_ball import (
-    BEARINGS,
-    PAPER_CAMERA,
-    EarlySphere,
-    PosedCamera,
-    centers,
-    points_on_ball,
-    rings_across,
-)
+from vm_train.evaluation.points_on_ball import BEARINGS, PosedCamera, centers, points_on_ball, rings_across
 from vm_train.evaluation.points_on_ball_plot import points_figure
 from vm_train.evaluation.points_over_distance import points_over_distance
 from vm_workstation.plots import new_figure, save_figure
@@ -43,7 +36,7 @@ SMALL = PosedCamera(
 def curves():
     """Of the paper's camera, by mesh and k."""
     distances = np.array([0.0, 0.025, 0.05, 0.5, 1.0, 2.5, 5.0, 10.0])
-    found = points_over_distance(PAPER_CAMERA, PAPER_BALL, (3, 4, 5), distances, early=True)
+    found = points_over_distance(PAPER_CAMERA, PAPER_BALL, (3, 4, 5), distances)
     return {(curve.mesh, curve.intersections): curve for curve in found}
 
 
@@ -131,7 +124,7 @@ def test_a_camera_that_is_too_low_or_shows_no_mesh_is_refused():
 @pytest.mark.parametrize("suffix", [".png", ".svg"])
 def test_the_same_curves_give_the_same_plot(tmp_path, suffix):
     pytest.importorskip("matplotlib")
-    curves = points_over_distance(SMALL, PAPER_BALL, (3,), np.linspace(0.0, 10.0, 5), early=True)
+    curves = points_over_distance(SMALL, PAPER_BALL, (3,), np.linspace(0.0, 10.0, 5))
     one, other = tmp_path / f"one{suffix}", tmp_path / f"other{suffix}"
     for path in (one, other):
         save_figure(points_figure(curves, "a title"), path)

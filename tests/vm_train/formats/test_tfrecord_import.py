@@ -1,7 +1,5 @@
 """TFRecord files become a folder of pictures and lenses; a stopped import continues."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from tests.folders import contents
 from vm_embedded import read_lens_file
 from vm_embedded.errors import InputError
 from vm_train.data.pictures import find_pictures
-from vm_train.formats.tfexample import BytesList
 
 from .test_picture_example import IMAGE, LENS, MASK, POSE, encoded, imported, reference_example, written
 
@@ -17,12 +14,10 @@ from .test_picture_example import IMAGE, LENS, MASK, POSE, encoded, imported, re
 @pytest.mark.parametrize("compressed", [False, True])
 def test_an_import_is_a_folder_of_pictures_with_the_same_bytes_and_lenses(tmp_path, compressed):
     png = encoded(".png", np.zeros((24, 32, 3), dtype=np.uint8))
-    path = written(
-        tmp_path / "a", reference_example(), reference_example(image=BytesList((png,))), compressed=compressed
-    )
+    path = written(tmp_path / "a", reference_example(), reference_example(image=[png]), compressed=compressed)
     shares = []
     made = imported([path], tmp_path / "out", report=shares.append)
-    assert (made.count, made.skipped, made.there) == (2, (), 0)
+    assert (made.count, made.skipped, made.there, made.remarks) == (2, (), 0, ())
     first, second = find_pictures(tmp_path / "out")
     assert (first.image.name, second.image.name) == ("image0000000.jpg", "image0000001.png")
     assert (first.image.read_bytes(), second.image.read_bytes()) == (IMAGE, png)
@@ -42,7 +37,7 @@ def test_a_damaged_payload_is_skipped_and_a_file_that_breaks_off_stops_the_impor
     path.write_bytes(data)
     made = imported([path], tmp_path / "out")
     assert made.count == 2
-    assert "record 0 is damaged" in made.skipped[0]
+    assert "record 0: it is damaged" in made.skipped[0]
     path.write_bytes(data[:-10])
     with pytest.raises(InputError, match="is cut short in record 2"):
         imported([path], tmp_path / "other")
@@ -90,33 +85,20 @@ def test_a_picture_without_one_of_its_files_is_written_again(tmp_path):
     assert contents(tmp_path / "out") == whole
 
 
-def test_files_may_be_appended_to_an_import_but_others_not_put_in_their_place(tmp_path):
+def test_files_may_be_appended_to_an_import_but_other_pictures_never_overwrite_it(tmp_path):
     first = written(tmp_path / "first", reference_example())
     second = written(tmp_path / "second", reference_example(), reference_example())
     out = tmp_path / "out"
     assert imported([first], out).count == 1
     made = imported([first, second], out)
     assert (made.count, made.there) == (2, 1)
-    assert imported([first], out).there == 1
-    assert [each["name"] for each in json.loads((out / "import.json").read_text())["files"]] == ["first", "second"]
-    for files, options in (([second], {}), ([second, first], {}), ([first], {"renaming": {"mask": "m"}})):
-        with pytest.raises(InputError, match=r"holds an import of other files, or with other options"):
-            imported(files, out, **options)
-
-
-@pytest.mark.parametrize("name", ["image0000000.jpg", "mask0000000.png", "lens0000000.yaml"])
-def test_a_folder_of_other_pictures_is_left_alone(name, tmp_path):
-    (tmp_path / name).write_bytes(IMAGE)
-    with pytest.raises(InputError, match=f"holds {name}, which no import wrote"):
-        imported([written(tmp_path / "a", reference_example())], tmp_path)
-
-
-def test_a_damaged_import_json_is_named(tmp_path):
-    path = written(tmp_path / "a", reference_example())
-    for text in ("{", "[]", "{}", '{"format": 1, "renaming": {}, "normalized": false, "files": 3}'):
-        (tmp_path / "import.json").write_text(text)
-        with pytest.raises(InputError, match=r"import\.json is damaged"):
-            imported([path], tmp_path)
+    whole = contents(out)
+    png = encoded(".png", np.zeros((24, 32, 3), dtype=np.uint8))
+    for number, changes in enumerate(({"image": [png]}, {"lens_fov": [1.0]}, {"mask": [MASK + b"\0"]})):
+        other = written(tmp_path / f"other{number}", reference_example(**changes))
+        with pytest.raises(InputError, match=r"already: two pictures have the number 0000000; import one"):
+            imported([other], out)
+    assert contents(out) == whole
 
 
 def test_files_that_are_not_there_and_a_folder_that_is_a_file_are_named(tmp_path):

@@ -16,6 +16,8 @@ from vm_embedded.network.model_file import read_model
 from vm_export.eight_bits import rounded
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.cli.train import main
+from vm_train.data.pictures import find_pictures
+from vm_train.data.split import Split, read_split, write_split
 from vm_train.learning.folder_access import locked
 from vm_train.learning.log import read_log
 
@@ -41,7 +43,7 @@ def whole(look, tmp_path_factory):
 def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn):
     folder, done = whole
     lines = done.stdout.splitlines()
-    assert re.fullmatch(r".*: 20 pictures: \d+ for training, \d+ for validation", lines[0])
+    assert re.fullmatch(r".*: 20 pictures: \d+ for training, \d+ for validation, 0 for test", lines[0])
     assert re.fullmatch(r"training: \d+ patches, \d+ of them show the object ball", lines[1])
     assert re.fullmatch(r"validation: \d+ proposals, \d+ of them show the object ball", lines[2])
     assert re.fullmatch(r"the mesh network proposes \d+ of \d+ visible objects \(\d+ %\)", lines[3])
@@ -62,6 +64,18 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     assert [(each["round"], each["epoch"]) for each in records if "epoch" in each] == [(1, 1), (1, 2), (2, 3), (2, 4)]
     result = json.loads((folder / "result.json").read_text())
     assert sum(each["count"] for each in result["bins"]) > 0
+
+
+def test_what_the_training_of_the_mesh_network_held_out_stays_held_out(whole, look, drawn, tmp_path):
+    for name in ("mesh.onnx", "run.json"):
+        shutil.copy(whole[0] / name, tmp_path)
+    numbers = tuple(each.number for each in find_pictures(drawn))
+    write_split(tmp_path / "pictures.json", Split(numbers[4:], numbers[2:4], numbers[:2]))
+    done = look(tmp_path / "run", "--from", tmp_path / "mesh.onnx", "--set", "training.epochs=2")
+    made = read_split(tmp_path / "run" / "pictures.json")
+    assert made.test == numbers[:2]
+    assert set(numbers[2:4]) < set(made.validation)
+    assert f"{len(made.training)} for training, {len(made.validation)} for validation, 2 for test" in done.stdout
 
 
 def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):

@@ -1,23 +1,51 @@
-"""Draws the pictures of docs/meshes.md and prints the numbers of its tables: python docs/mesh_pictures.py"""
+"""Draws the pictures of meshes in docs/ and prints the numbers of their tables: python -m benchmarks.mesh_pictures"""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 
-from vm_embedded import Circle, Cylinder, Sphere
+from vm_embedded import Circle, Cylinder, Equisolid, Orientation, Sphere
+from vm_embedded.arrays import Number
 from vm_embedded.mesh.walls import wall_distances
 from vm_mesh.built_mesh import BuiltMesh, MeshPlan
 from vm_mesh.drawing import draw_mesh
 from vm_mesh.quality import points_on_object
-from vm_train.evaluation.points_on_ball import EarlySphere
+from vm_train.evaluation.points_on_ball import PosedCamera
+from vm_train.evaluation.points_on_ball_plot import points_figure
+from vm_train.evaluation.points_over_distance import points_over_distance
 from vm_workstation.plots import new_figure, save_figure
 
-FOLDER = Path(__file__).parent
+FOLDER = Path(__file__).parents[1] / "docs"
 BALL = Sphere(0.095)
 POST = Cylinder(0.05, 1.8)
 RING, OURS, OBJECT, GRAY = "#4c72b0", "#1b9e77", "#d95f02", "#999999"
+
+PAPER_CAMERA = PosedCamera(
+    Orientation.from_roll_pitch(0.9, pitch=math.radians(45.0)),
+    Equisolid(focal_length=420.0, fov=2.6, size=(1280, 1024)),
+    (1280, 1024),
+)
+"""A camera like that of the pictures of the paper's authors. It sees from the point below itself to the horizon.
+
+Of the camera in its figure, the paper gives only the size of the pictures, 1280 x 1024 px. Height and lens come from
+the pictures published with the paper's code: 0.78 to 1.2 m high, median 0.9 m; equisolid, f = 420 px, fov 1.6 to 2.6
+rad.
+"""
+
+
+class EarlySphere(Sphere):
+    """A ball with the theta of an early version of the reference: 2 asin(r / (h tan(phi) + r)).
+
+    The added r avoids the singularity of the paper's `circle_dtheta`, where the sine would exceed 1. But it makes the
+    rings near the camera's foot too dense, by (d + r) / d at distance d. The result is a peak at 0 m like the one in
+    the paper's figure (section "Precision"); our theta has no such peak.
+    """
+
+    def theta(self, n: Number, height: Number) -> Number:
+        return 2.0 * np.arcsin(self.radius / (height * np.tan(self.phi(n, height)) + self.radius))
 
 
 def main() -> None:
@@ -25,6 +53,7 @@ def main() -> None:
     save_figure(draw_shapes(), FOLDER / "mesh-shapes.svg")
     save_figure(draw_below(), FOLDER / "mesh-below.png")
     save_figure(draw_tall(), FOLDER / "mesh-tall.png")
+    save_figure(draw_ball_distance(), FOLDER / "ball-distance.svg")
 
 
 def draw_models():
@@ -150,6 +179,16 @@ def print_points_on_ball(distances):
                     f"h {height} k {k:g} {model}: {len(built.mesh)} points, k {found.low.min():.2f} to "
                     f"{found.high.max():.2f}; within 0.7 m {found.low[near].min():.2f} to {found.high[near].max():.2f}"
                 )
+
+
+def draw_ball_distance():
+    """The paper's fig:ball_distance_graph for a ball of 0.075 m; prints the points on it at some distances."""
+    distances = np.linspace(0.0, 10.0, 201)
+    curves = points_over_distance(PAPER_CAMERA, Sphere(0.075), (3, 4, 5), distances)
+    for curve in curves:
+        shown = (f"{curve.mean[np.argmin(abs(distances - d))]:.1f} at {d} m" for d in (0, 1, 2, 5, 10))
+        print(curve.mesh, curve.intersections, curve.count, "points on screen; on the ball:", ", ".join(shown))
+    return points_figure(curves, "camera 0.9 m high, 45 degrees down, 1280 x 1024 px; ball of radius 0.075 m")
 
 
 def draw_tall():

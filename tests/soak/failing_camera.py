@@ -1,31 +1,26 @@
-"""A camera that fails on purpose, to test how a robot's software reacts. A script lists its faults:
+"""vm-detect with a synthetic camera that fails on purpose.
 
-source = "synthetic"                                    # the camera to which faults are added
-faults = [{ kind = "hang", at = 5.0, seconds = 2.0 }]   # at: time since the camera was first opened [s]
-
-[random]                                                # adds random faults, one after another
-count = 200
+`python failing_camera.py FAULTS ...` runs vm-detect with the options that follow; FAULTS is a list in JSON of faults:
+kind, start since the camera was first opened [s], and length [s].
 """
 
 from __future__ import annotations
 
+import json
+import sys
 import time
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import cv2
 import numpy as np
 
-from ..arrays import number_or_nan
-from ..config.entries import check_entries, number
-from ..config.sections import read_sections
-from ..errors import InputError, unknown
-from .camera import Camera, CameraError, Shot
-from .decoding import decode_frame
+from vm_embedded.cameras import open_camera
+from vm_embedded.cameras.camera import Camera, CameraError, Shot
+from vm_embedded.cameras.decoding import decode_frame
 
 KINDS = {
     "unplug": "reading and opening fail",
@@ -65,78 +60,18 @@ class Fault:
     seconds: float
 
 
-@dataclass(frozen=True)
-class RandomFaults:
-    """Section [random]: random faults, one after another."""
-
-    count: int = number(0, "number of random faults", "", (0, 100000))
-    seed: int = number(0, "seed of the random numbers", "", (0, 2**31))
-    first: float = number(2.0, "start of the first fault", "s", (0, 1e6))
-    shortest: float = number(0.3, "shortest fault", "s", (0, 1e4))
-    longest: float = number(1.0, "longest fault", "s", (0, 1e4))
-    pause: float = number(1.0, "pause between two faults", "s", (0, 1e4))
-
-    def __post_init__(self) -> None:
-        check_entries(self)
-
-    def draw(self) -> Iterator[Fault]:
-        """Draw the faults; all kinds are equally frequent."""
-        random = np.random.default_rng(self.seed)
-        kinds = np.resize(list(KINDS), self.count)
-        random.shuffle(kinds)
-        at = self.first
-        for kind in kinds.tolist():
-            seconds = float(random.uniform(self.shortest, max(self.shortest, self.longest)))
-            yield Fault(kind, at, seconds)
-            at += seconds + self.pause
-
-
-def _read_source(value: object) -> str:
-    if not isinstance(value, str) or not value or value.startswith("fault:"):
-        raise InputError(f"source must be the name of another camera, not {value!r}")
-    return value
-
-
-def _read_faults(value: object) -> tuple[Fault, ...]:
-    if not isinstance(value, list):
-        raise InputError(f"faults must be a list, not {value!r}")
-    return tuple(_read_fault(each) for each in value)
-
-
-def _read_fault(value: object) -> Fault:
-    if not isinstance(value, Mapping) or set(value) != {"kind", "at", "seconds"}:
-        raise InputError(f'write a fault like {{ kind = "hang", at = 5.0, seconds = 2.0 }}, not {value!r}')
-    if value["kind"] not in KINDS:
-        raise InputError(unknown("kind of fault", value["kind"], KINDS))
-    given = [value["at"], value["seconds"]]
-    at, seconds = map(number_or_nan, given)
-    if not (0.0 <= at < 1e6 and 0.0 <= seconds < 1e6):
-        raise InputError(f"at and seconds of a fault must be numbers from 0 s to 1e6 s, not {given}")
-    return Fault(value["kind"], at, seconds)
-
-
-@dataclass(frozen=True)
-class FaultScript:
-    """The source of the camera to which faults are added, and its faults in the order of their start."""
-
-    source: str = field(default="synthetic", metadata={"read": _read_source})
-    faults: tuple[Fault, ...] = field(default=(), metadata={"read": _read_faults})
-    random: RandomFaults = field(default_factory=RandomFaults)
-
-    @classmethod
-    def read(cls, path: Path) -> FaultScript:
-        """Read a script. Raises InputError."""
-        script: FaultScript = read_sections(cls, path, noun="fault script")
-        return replace(script, faults=tuple(sorted((*script.faults, *script.random.draw()), key=lambda each: each.at)))
+def command(faults: Sequence[Fault]) -> list[str]:
+    """The command that runs vm-detect with such a camera, for its options to follow."""
+    return [sys.executable, __file__, json.dumps([astuple(each) for each in faults])]
 
 
 class Faults:
-    """Tells which fault of a script is active. Time starts when the camera is first opened; if faults overlap, only the
-    last one is active."""
+    """Tells which of some faults is active, given in the order of their start. Time starts when the camera is first
+    opened; if faults overlap, only the last one is active."""
 
-    def __init__(self, script: FaultScript) -> None:
-        self._faults = script.faults
-        self._starts = [each.at for each in script.faults]
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        self._faults = faults
+        self._starts = [each.at for each in faults]
         self._began: float | None = None
         self.last: Shot | None = None
         """The last good shot, which a frozen camera repeats even after it was opened again."""
@@ -157,7 +92,7 @@ class Faults:
         return max(fault.at + fault.seconds - (time.monotonic() - (self._began or 0.0)), 0.0)
 
 
-class FaultCamera:
+class FailingCamera:
     """Another camera with faults. Raises CameraError while it is unplugged."""
 
     def __init__(self, faults: Faults, open_camera: Callable[[], Camera]) -> None:
@@ -219,4 +154,18 @@ def _marked(shot: Shot, kind: str) -> Shot:
 
 def _check_plugged(fault: Fault | None) -> None:
     if fault is not None and fault.kind == "unplug":
-        raise CameraError("camera is unplugged by the fault script")
+        raise CameraError("camera is unplugged by a fault")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run vm-detect with faults, and return its exit status."""
+    from vm_embedded.cli.detect import main as detect
+
+    faults = Faults([Fault(*each) for each in json.loads(arguments[0])])
+    synthetic = open_camera.SyntheticCamera
+    open_camera.SyntheticCamera = lambda settings: FailingCamera(faults, lambda: synthetic(settings))  # type: ignore
+    return detect(["--camera", "synthetic", *arguments[1:]])
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
