@@ -71,7 +71,7 @@ class Variant:
     seeds: int = 1
 
 
-COMMON: Changes = {"training": {"epochs": 2, "looks": 4, "views": 1, "rate": 0.02}, "data": {"test": 0.0}}
+COMMON: Changes = {"training": {"epochs": 2, "repeats": 4, "views": 1, "rate": 0.02}, "data": {"test": 0.0}}
 VARIANTS: dict[str, Variant] = {
     "base": Variant({}, seeds=3),
     "3 layers": Variant({"network": {"depth": 3}}, seeds=2),
@@ -143,10 +143,10 @@ def trained(task: tuple[str, int, Path, Path]) -> Path:
     name, seed, data, out = task
     import torch
 
-    from vm_train.learning.hardware import Hardware
-    from vm_train.learning.rounds import train
-    from vm_train.learning.run_folder import begin_run, read_run
-    from vm_train.learning.training_data import TrainingData
+    from vm_train.learning.run import begin_run, read_run
+    from vm_train.learning.training import MeshTraining
+    from vm_train.runs.hardware import Hardware
+    from vm_train.runs.loop import train
 
     torch.set_num_threads(1)
     folder = folder_of(out, name, seed)
@@ -158,9 +158,9 @@ def trained(task: tuple[str, int, Path, Path]) -> Path:
             for section, entries in changes.items():
                 table[section] = entries if section == "classes" else {**table.get(section, {}), **entries}
         configuration = read_sections(TrainConfiguration, None, table)
-        pictures = TrainingData(data, split_of(data, VARIANTS[name].only), out / "unpacked")
-        run = begin_run(folder, pictures, configuration)
-    train(run, Hardware("cpu", 0, 1, 0), lambda: False)
+        run = begin_run(folder, data, split_of(data, VARIANTS[name].only), configuration, unpacked=out / "unpacked")
+    hardware = Hardware("cpu", 0, 1, 0)
+    train(MeshTraining(run, hardware), hardware, lambda: False)
     return folder
 
 

@@ -74,7 +74,7 @@ def fine_tune(model: str, frames: Sequence[BoxedPicture], seed: int, folder: Pat
     if is_continued:
         command += ["resume", str(folder / "run")]
     else:
-        command += ["look", "--from", model, "--boxes", str(folder / "frames"), "--names", *names]
+        command += ["tune", str(folder / "frames"), "--from", model, "--names", *names]
         command += ["-o", str(folder / "run"), "--set", f"training.seed={seed}", "--set", f"data.split_seed={seed}"]
         command += ["--set", "data.test=0"]
     start = time.perf_counter()
@@ -108,7 +108,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Recall of a close look before and after fine-tuning.")
     parser.add_argument("training", type=Path, help="folder of frames with YOLO boxes to learn from")
     parser.add_argument("test", type=Path, help="folder of frames with boxes to measure")
-    parser.add_argument("--names", nargs="+", default=[], help="new names of classes, as for vm-train look")
+    parser.add_argument("--names", nargs="+", default=[], help="new names of classes, as for vm-train tune")
     parser.add_argument("--from", dest="model", default=DEFAULT, help=f"network to begin with; default {DEFAULT}")
     parser.add_argument("--counts", type=int, nargs="+", default=list(COUNTS), help="frames to learn from; 0: all")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS), help="seeds of drawing and training")

@@ -157,7 +157,7 @@ def main() -> None:
     with Timer(loop, "vm-label"):
         answers = label(loop, train)
         loop.run("vm-label", "boxes", "--write", "judged")
-    loop.timed("vm-train", ["vm-train", "look", "--from", "ball", "--boxes", "judged", "-o", "tuned"])
+    loop.timed("vm-train", ["vm-train", "tune", "judged", "--from", "ball", "-o", "tuned"])
     loop.timed("vm-export", ["vm-export", "ball", "--look", "tuned/look.pt", "-o", "own.onnx"])
     held_out = ["--list", "tuned/pictures.json", "--object-radius", "0.11", "ball", "own.onnx"]
     loop.timed("vm-evaluate", ["vm-evaluate", "--boxes", "judged", *held_out, "-o", "evaluation"])

@@ -32,11 +32,11 @@ from vm_export.change_model import change_looks
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split
-from vm_train.learning.hardware import set_up_hardware
-from vm_train.look.collected import collect
 from vm_train.look.configuration import LookConfiguration
-from vm_train.look.run_folder import LookRun, begin_look_run, read_look_run
-from vm_train.look.training import is_finished, train_look
+from vm_train.look.run import LookRun, begin_look_run, read_look_run
+from vm_train.look.training import LookTraining
+from vm_train.runs.hardware import set_up_hardware
+from vm_train.runs.loop import train
 
 BASE = Path(__file__).with_name("look_choices.toml")
 RESULTS = Path(__file__).with_name("look_choices.json")
@@ -111,13 +111,13 @@ def trained(task: Task) -> Path:
     else:
         split = split_of(data, VARIANTS[name].get("pictures", {}).get("training", TRAINING))
         run = begin_look_run(folder, data, split, configuration_of(name, seed), model, model.stem)
-    if not is_finished(run):
+    if not run.result_path.exists():
         with set_up_hardware("cpu", 1, 1) as hardware:
             _share_patches(run, out)
-            train_look(run, collect(run, 1), hardware, lambda: False)
+            train(LookTraining(run, hardware), hardware, lambda: False)
     path = folder / "model.onnx"
     if not path.exists():
-        change_looks(model, path, [LookCheckpoint.load(run.look_path)])
+        change_looks(model, path, [LookCheckpoint.load(run.result_path)])
     return path
 
 
@@ -125,8 +125,8 @@ def _share_patches(run: LookRun, out: Path) -> None:
     """Link the patches of a training that has collected the same ones."""
     for path in sorted(out.glob("*/seed*/run.json")):
         other = read_look_run(path.parent)
-        same = (other.split, other.mesh_sha256) == (run.split, run.mesh_sha256)
-        if same and _cut(other) == _cut(run) and is_finished(other) and not any(run.patches.iterdir()):
+        same = (other.split, other.digests[other.mesh.name]) == (run.split, run.digests[run.mesh.name])
+        if same and _cut(other) == _cut(run) and other.result_path.exists() and not any(run.patches.iterdir()):
             for file in other.patches.iterdir():
                 os.link(file, run.patches / file.name)
 

@@ -23,10 +23,10 @@ from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import GeometryError
+from vm_train.data.class_table import ClassTable
 from vm_train.data.pictures import read_picture
 from vm_train.evaluation.answers import ExactSubject, load_subject
 from vm_train.evaluation.picture_selection import select_pictures
-from vm_train.learning.class_table import ClassTable
 from vm_train.scores.object_scores import ObjectScores
 from vm_train.scores.overlaps import TrueObject
 from vm_train.truth.objects import read_scene, true_objects

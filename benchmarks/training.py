@@ -27,11 +27,11 @@ from vm_train.data.split import Split
 from vm_train.graphs.loading import PictureGraphs
 from vm_train.graphs.schedule import Item
 from vm_train.learning.configuration import TrainConfiguration
-from vm_train.learning.hardware import Hardware
-from vm_train.learning.rounds import train
-from vm_train.learning.run_folder import begin_run
+from vm_train.learning.run import begin_run
 from vm_train.learning.trainer import Trainer
-from vm_train.learning.training_data import TrainingData
+from vm_train.learning.training import MeshTraining
+from vm_train.runs.hardware import Hardware
+from vm_train.runs.loop import train
 
 RESULTS = Path(__file__).with_name("training.json")
 PAGE = DOCS / "training.md"
@@ -62,7 +62,7 @@ def per_second(call: Callable[[int], object], count: int) -> float:
 def parts(data: Path, numbers: tuple[str, ...], folder: Path) -> dict[str, float]:
     """Pictures per second on one core."""
     made = configuration(5, 4)
-    run = begin_run(folder / "parts", TrainingData(data, Split(numbers, (), ()), folder / "unpacked"), made)
+    run = begin_run(folder / "parts", data, Split(numbers, (), ()), made, unpacked=folder / "unpacked")
     kept = run.graphs(numbers)
     plain = PictureGraphs(list(kept.pictures), kept.recipe, None)
     for each in range(len(numbers)):
@@ -95,12 +95,14 @@ def whole(data: Path, numbers: tuple[str, ...], folder: Path, workers: int) -> d
     for name, (depth, width) in NETWORKS.items():
         split = Split(numbers[8:], numbers[:8], ())
         made = configuration(depth, width)
-        run = begin_run(folder / f"{depth}x{width}", TrainingData(data, split, folder / "unpacked"), made)
+        run = begin_run(folder / f"{depth}x{width}", data, split, made, unpacked=folder / "unpacked")
         graphs = run.graphs(numbers)
         for each in range(len(numbers)):
             graphs[Item(each)]  # unpacks it
-        done = train(run, Hardware("cpu", 0, 1, workers), lambda: False)
-        found[name] = round(done.pictures / done.seconds, 1)
+        hardware = Hardware("cpu", 0, 1, workers)
+        done = MeshTraining(run, hardware)
+        train(done, hardware, lambda: False)
+        found[name] = round(done.speed, 1)
     return found
 
 

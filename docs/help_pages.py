@@ -25,8 +25,7 @@ from vm_label import cli as label
 from vm_mesh import cli as mesh
 from vm_ros import cli as ros
 from vm_synth import cli as synth
-from vm_train.cli import evaluate
-from vm_train.cli import options as train
+from vm_train.cli import evaluate, train
 
 _ABOUT = (argparse._HelpAction, argparse._VersionAction, PrintAllHelp, PrintCompletion)
 """Options that all programs have."""

@@ -22,7 +22,7 @@ ROOMS = {
     "vm_synth": "__main__ > cli > dataset > render > scene > balls, bodies",
     "vm_mesh": "",
     "vm_label": "",
-    "vm_train": "__main__ > cli > tuning > look > evaluation > learning > graphs > truth > formats"
+    "vm_train": "__main__ > cli > tuning > look > evaluation, learning > graphs, runs > truth > formats"
     " > boxes, data, scores",
     "vm_calibrate": "",
     "vm_ros": "",

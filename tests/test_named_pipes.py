@@ -33,7 +33,7 @@ yolo/a.jpg                  vm-train check yolo --boxes
 yolo/a.txt                  vm-train check yolo --boxes
 yolo/classes.txt            vm-train check yolo --boxes
 yolo/a.txt                  vm-train import-boxes yolo out
-yolo/classes.txt            vm-train look --from ball --boxes yolo -o new
+yolo/classes.txt            vm-train tune yolo --from ball -o new
 yolo/a.yaml                 vm-train check yolo --boxes
 voc/a.xml                   vm-train check voc --boxes
 coco/coco.json              vm-train check coco --boxes

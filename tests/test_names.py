@@ -28,8 +28,8 @@ from vm_synth.scene.configuration import SceneConfiguration
 from vm_synth.scene.own_object import ObjectRanges
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.box_options import parse_names
+from vm_train.data.class_table import ClassTable
 from vm_train.evaluation.html_page import html_table
-from vm_train.learning.class_table import ClassTable
 from vm_train.learning.configuration import TrainConfiguration
 from vm_train.truth.objects import read_scene
 from vm_workstation.plots import new_figure, save_figure

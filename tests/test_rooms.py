@@ -215,8 +215,8 @@ def test_an_import_of_the_public_names_is_reported(made):
 
 
 def test_an_import_of_a_package_above_is_reported(made):
-    modules = made(lower="from vm_embedded import errors\nfrom vm_train.learning import recipe") | PROJECT
-    assert "made.lower imports vm_train.learning.recipe" in rooms.upward_imports(modules)
+    modules = made(lower="from vm_embedded import errors\nfrom vm_train.learning import configuration") | PROJECT
+    assert "made.lower imports vm_train.learning.configuration" in rooms.upward_imports(modules)
     assert "made.lower imports vm_embedded.errors" not in rooms.upward_imports(modules)
 
 

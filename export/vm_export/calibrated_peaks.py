@@ -14,7 +14,7 @@ from vm_embedded.network.model_file import ModelFile, parse_model
 
 from .metadata import with_metadata
 from .network_weights import network_of
-from .strong_self_test import strong_self_test
+from .self_testing import strong_self_test
 
 
 def with_calibrated_peaks(path: str | Path, read: ModelFile, changes: Mapping[str, tuple[float, float]]) -> bytes:

@@ -20,7 +20,7 @@ from .look_checkpoint import LookCheckpoint
 from .look_weights import looks_of
 from .metadata import with_metadata
 from .network_weights import network_of
-from .strong_self_test import strong_self_test
+from .self_testing import strong_self_test
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from .checkpoint import Checkpoint
 from .look_checkpoint import LookCheckpoint
 from .mesh_networks import MeshNetwork, model_outputs
 from .plain_graph import plain_model
-from .strong_self_test import strong_self_test
+from .self_testing import strong_self_test
 
 LARGEST_DIFFERENCE = 1e-4
 """Largest difference of an answer that is allowed between ONNX Runtime and torch."""

@@ -163,5 +163,5 @@ def _report(target: Path, written: Written) -> str:
     lines = [f"{target}: {written.images} images, {written.background} of them background; boxes: {boxes}"]
     lines += [f"left out: {count} image{'s' * (count != 1)} {reason}" for count, reason in left if count]
     start = "ball" if set(written.boxes) <= {"ball"} else "MODEL"
-    lines.append(f"next: vm-train look --from {start} --boxes {target} -o tuned")
+    lines.append(f"next: vm-train tune {target} --from {start} -o tuned")
     return "\n".join(lines)

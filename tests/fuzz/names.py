@@ -28,8 +28,8 @@ from vm_embedded.output.messages import live_frame, to_json_line
 from vm_export.reference import named_class
 from vm_label.box_folder import read_box_folder
 from vm_train.boxes.read import read_boxes
+from vm_train.data.class_table import ClassTable
 from vm_train.evaluation.html_page import html_table
-from vm_train.learning.class_table import ClassTable
 from vm_workstation.text_tables import aligned
 
 from .scratch import scratch

@@ -51,7 +51,7 @@ def test_only_fully_judged_images_become_training_data(tmp_path):
         "left out: 1 image with unanswered crops",
         "left out: 1 image with skipped crops",
         "left out: 1 image without any crop or answer (--empty writes them)",
-        f"next: vm-train look --from ball --boxes {tmp_path / 'out'} -o tuned",
+        f"next: vm-train tune {tmp_path / 'out'} --from ball -o tuned",
     ]
     out = tmp_path / "out"
     assert sorted(path.name for path in out.iterdir()) == sorted(
@@ -89,7 +89,7 @@ def test_images_keep_their_folders_and_only_chosen_classes_count(tmp_path):
 def test_the_next_training_does_not_begin_with_the_ball_if_the_boxes_show_something_else(tmp_path):
     folder = make_folder(tmp_path / "boxes", 1, near=False, classes=("cup",))
     judge(folder, ["yes"])
-    assert "next: vm-train look --from MODEL" in run(folder, "--write", tmp_path / "out").stdout
+    assert f"next: vm-train tune {tmp_path / 'out'} --from MODEL" in run(folder, "--write", tmp_path / "out").stdout
 
 
 def test_images_with_unreadable_boxes_are_left_out(tmp_path):

@@ -13,7 +13,7 @@ from .findings import NO_BOX, Finding
 
 
 @dataclass(frozen=True)
-class Sighting:
+class FoundBox:
     """An object that a detector sees in an image: its box, named by its class, and its probability from 0 to 1."""
 
     image: Path
@@ -21,7 +21,7 @@ class Sighting:
     probability: float
 
 
-def without_box(pictures: Sequence[BoxedPicture], sightings: Iterable[Sighting]) -> list[Sighting]:
+def without_box(pictures: Sequence[BoxedPicture], sightings: Iterable[FoundBox]) -> list[FoundBox]:
     """The sightings that overlap no box of their class, the most probable first.
 
     Of sightings that overlap each other, only the most probable one is left. Sightings in images that are not among the
@@ -36,7 +36,7 @@ def without_box(pictures: Sequence[BoxedPicture], sightings: Iterable[Sighting])
     return found
 
 
-def describe(sighting: Sighting, folder: Path) -> Finding:
+def describe(sighting: FoundBox, folder: Path) -> Finding:
     """A remark about an unlabeled object, with the image's path below the folder."""
     box = sighting.box
     x, y = box.center

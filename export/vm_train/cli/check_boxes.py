@@ -28,7 +28,7 @@ from ..boxes.findings import finding_lines
 from ..boxes.read import files_in, read_boxes
 from ..boxes.sheet import box_sheet, unusual_first
 from ..boxes.summary import classes_of, name_faults, summary_lines
-from ..boxes.unlabeled import Sighting, describe, without_box
+from ..boxes.unlabeled import FoundBox, describe, without_box
 from .box_options import add_box_options, parse_names
 
 EXIT_FAULTS = 1
@@ -106,7 +106,7 @@ def run_check_boxes(options: argparse.Namespace) -> int:
     return EXIT_FAULTS if found.faults else EXIT_OK
 
 
-def _unlabeled(found: BoxedSet, network: Path, is_round: bool) -> list[Sighting]:
+def _unlabeled(found: BoxedSet, network: Path, is_round: bool) -> list[FoundBox]:
     """The objects that the network's close look sees clearly where no box is. Raises ModelError."""
     from ..tuning.sightings import clear_sightings
 
@@ -141,7 +141,7 @@ def _objects(network: Path) -> tuple[list[str], list[str]]:
 
 
 def _write_sheet(
-    options: argparse.Namespace, found: BoxedSet, objects: Sequence[str], unlabeled: Sequence[Sighting]
+    options: argparse.Namespace, found: BoxedSet, objects: Sequence[str], unlabeled: Sequence[FoundBox]
 ) -> None:
     places = [place for name in objects for place in unusual_first(found.pictures, name)]
     most = options.count or _ON_SHEET

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def detector_settings(options: argparse.Namespace) -> Settings:
     """The settings of --config, and of the options, which override them. Raises InputError."""
     configured = read_configuration(options.config).detector if options.config else Settings()
-    given = {each.name: getattr(options, each.name) for each in fields(Settings) if each.name != "format"}
+    given = {each.name: getattr(options, each.name, None) for each in fields(Settings) if each.name != "format"}
     chosen = {name: value for name, value in given.items() if value is not None}
     return replace(configured, **chosen, format="bgr")
 

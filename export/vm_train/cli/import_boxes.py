@@ -25,7 +25,7 @@ from ..formats.box_import import import_boxes
 from ..formats.box_masks import MaskRule
 from ..learning.configuration import TrainConfiguration
 from .box_options import add_box_options, divided_remark, parse_names
-from .training import load_start, read_configuration
+from .mesh import load_start, read_configuration
 
 _NAMED = 40
 """Boxes without labels to print."""
@@ -120,7 +120,7 @@ def _check(found: BoxedSet, rule: MaskRule, folder: Path) -> None:
     if not any(_has_object(each, rule) for each in found.pictures if each.lens is not None):
         raise InputError(
             f"no frame of {folder} has a box of {objects} and a lens file beside it (NAME.yaml or lensNAME.yaml); "
-            "vm-train look --boxes needs no lens"
+            "vm-train tune needs no lens"
         )
 
 

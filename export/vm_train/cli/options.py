@@ -1,4 +1,4 @@
-"""The options of vm-train and its other commands."""
+"""The options that commands of vm-train share, and those of training a mesh network."""
 
 from __future__ import annotations
 
@@ -10,30 +10,28 @@ from vm_embedded.cli.program import Parser
 from vm_embedded.network.bundled import SHIPPED
 from vm_workstation.option_types import add_device, add_set, at_least
 
-from .check import check_parser
-from .fine_tuning import tune_config_parser
-from .import_boxes import import_boxes_parser
-from .import_pictures import import_parser
-from .look import look_config_parser, look_parser
+from ..runs.configuration import KINDS, configuration_name
+
+SET_EXAMPLE = "training.epochs=5"
 
 _EPILOG = """\
 other commands (add --help for their options):
-  vm-train look --boxes DIR      fine-tune a network on your own frames
+  vm-train mesh DATA             the same as vm-train DATA
   vm-train look DATA             train the close look, which judges proposals
+  vm-train tune FRAMES           fine-tune a network on your own frames
   vm-train check DATA            count what the pictures show, list damaged ones
   vm-train resume RUN            continue a training that was stopped
   vm-train preview DATA          draw augmented pictures with points of the mesh
   vm-train rate DATA             find a learning rate
   vm-train import FILES OUT      unpack tar archives, convert TFRecord files
   vm-train import-boxes DIR OUT  make masks of frames with boxes, lens and pose
-  vm-train config, vm-train look-config, vm-train tune-config
-                                 print a configuration with all its entries
+  vm-train config KIND           print a configuration with all its entries
 
 Exit status: 0 success, 1 failure (see standard error), 2 usage, 130 stopped
 """
 
 
-def parser() -> argparse.ArgumentParser:
+def mesh_parser() -> argparse.ArgumentParser:
     """The options of vm-train DATA."""
     made = Parser(
         commands=tuple(dict.fromkeys(re.findall(r"vm-train ([a-z-]+)", _EPILOG))),
@@ -44,12 +42,12 @@ def parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    _add_data(made)
-    made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
-    _add_configuration(made)
+    add_data(made)
+    add_output(made)
+    add_configuration(made)
     add_start(made)
     _add_pictures(made)
-    _add_hardware(made)
+    add_hardware(made)
     return made
 
 
@@ -61,7 +59,7 @@ def resume_parser() -> argparse.ArgumentParser:
     )
     made.add_argument("run", type=Path, metavar="RUN", help="folder of the training")
     made.add_argument("--data", type=Path, metavar="DATA", help="new folder of the pictures, if they were moved")
-    _add_hardware(made)
+    add_hardware(made)
     return made
 
 
@@ -72,8 +70,8 @@ def preview_parser() -> argparse.ArgumentParser:
         description="Draw pictures with the points of the mesh in the colors of their classes, without and with "
         "augmentation. The rows below show each kind of augmentation alone.",
     )
-    _add_data(made)
-    _add_configuration(made)
+    add_data(made)
+    add_configuration(made)
     made.add_argument("--count", type=at_least(1), default=4, metavar="N", help="number of pictures; default 4")
     made.add_argument(
         "--versions", type=at_least(1), default=5, metavar="N", help="augmented versions of each picture; default 5"
@@ -92,38 +90,25 @@ def rate_parser() -> argparse.ArgumentParser:
         prog="vm-train rate",
         description="Train for some steps with an increasing learning rate until the loss increases. Propose a rate.",
     )
-    _add_data(made)
-    _add_configuration(made)
+    add_data(made)
+    add_configuration(made)
     made.add_argument("--steps", type=at_least(20), default=200, metavar="N", help="number of steps; default 200")
     made.add_argument("--plot", type=Path, metavar="FILE", help="plot of the loss over the rate, .png or .svg")
-    _add_hardware(made)
+    add_hardware(made)
     return made
 
 
 def config_parser() -> argparse.ArgumentParser:
-    """The parser of vm-train config, which has no options."""
-    return Parser(
+    """The options of vm-train config."""
+    made = Parser(
         prog="vm-train config",
-        description="Print a train.toml with all entries, their meanings, units, limits and defaults.",
+        description="Print the configuration of a training with all entries, their meanings, units, limits and "
+        "defaults.",
     )
-
-
-def parsers() -> dict[str, argparse.ArgumentParser]:
-    """All parsers, by command."""
-    made = (
-        parser(),
-        look_parser(),
-        look_config_parser(),
-        tune_config_parser(),
-        resume_parser(),
-        check_parser(),
-        preview_parser(),
-        rate_parser(),
-        config_parser(),
-        import_parser(),
-        import_boxes_parser(),
+    made.add_argument(
+        "kind", nargs="?", choices=KINDS, default=KINDS[0], metavar="KIND", help="mesh, look or tune; default: mesh"
     )
-    return {each.prog: each for each in made}
+    return made
 
 
 def add_start(made: argparse.ArgumentParser) -> None:
@@ -137,13 +122,21 @@ def add_start(made: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_data(made: argparse.ArgumentParser) -> None:
+def add_data(made: argparse.ArgumentParser) -> None:
+    """Add DATA: pictures with masks."""
     made.add_argument("data", type=Path, metavar="DATA", help="folder of imageX.jpg or .png, maskX.png, lensX.yaml")
 
 
-def _add_configuration(made: argparse.ArgumentParser) -> None:
-    made.add_argument("--config", type=Path, metavar="FILE", help="train.toml; missing entries keep their defaults")
-    add_set(made, "training.epochs=5")
+def add_output(made: argparse.ArgumentParser) -> None:
+    """Add --output."""
+    made.add_argument("-o", "--output", type=Path, required=True, metavar="RUN", help="new folder for the training")
+
+
+def add_configuration(made: argparse.ArgumentParser, kind: str = "mesh") -> None:
+    """Add --config and --set for a kind of training."""
+    name = configuration_name(kind)
+    made.add_argument("--config", type=Path, metavar="FILE", help=f"{name}; missing entries keep their defaults")
+    add_set(made, SET_EXAMPLE)
 
 
 def _add_pictures(made: argparse.ArgumentParser) -> None:
@@ -162,7 +155,8 @@ def _add_pictures(made: argparse.ArgumentParser) -> None:
     cache.add_argument("--no-unpacked", action="store_true", help="no such cache; for slow or small disks")
 
 
-def _add_hardware(made: argparse.ArgumentParser) -> None:
+def add_hardware(made: argparse.ArgumentParser) -> None:
+    """Add what trains and how much of it."""
     group = made.add_argument_group("hardware")
     add_device(group)
     group.add_argument(

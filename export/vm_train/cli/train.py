@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, discard_output, program
 from vm_embedded.config.sections import read_sections
@@ -16,43 +17,31 @@ from vm_workstation.stopping import stoppable
 
 from ..data.picture_files import paths_of
 from ..data.pictures import find_pictures
-from ..learning.configuration import HEADER, TrainConfiguration
-from ..learning.folder_access import kind_of
-from .check import run_check
+from ..learning.configuration import TrainConfiguration
+from ..look.configuration import LookConfiguration
+from ..runs.configuration import KINDS, header
+from ..runs.run import kind_of
+from ..tuning.configuration import TuningConfiguration
+from .check import check_parser, run_check
 from .check_boxes import refuse_other_options, run_check_boxes
-from .fine_tuning import print_tune_config, resume_fine_tuning
-from .import_boxes import run_import_boxes
-from .import_pictures import run_import
-from .look import print_look_config, resume_look, run_look
-from .options import parsers
-from .training import find_good_pictures, read_configuration, run_resume, run_training
-
-_TRAININGS = (None, "look", "resume")
-"""Commands whose work vm-train resume continues."""
+from .import_boxes import import_boxes_parser, run_import_boxes
+from .import_pictures import import_parser, run_import
+from .look import look_parser, resume_look, run_look
+from .mesh import find_good_pictures, read_configuration, resume_mesh, run_mesh
+from .options import config_parser, mesh_parser, preview_parser, rate_parser, resume_parser
+from .tune import resume_tune, run_tune, tune_parser
 
 
 @program
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run vm-train and return its exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    commands: dict[str, Callable[[argparse.Namespace], int]] = {
-        "look": run_look,
-        "resume": _resume,
-        "check": _check,
-        "preview": _preview,
-        "rate": _rate,
-        "config": _config,
-        "look-config": print_look_config,
-        "tune-config": print_tune_config,
-        "import": run_import,
-        "import-boxes": run_import_boxes,
-    }
-    command = given[0] if given[:1] and given[0] in commands else None
-    prog = "vm-train" if command is None else f"vm-train {command}"
-    options = parsers()[prog].parse_args(given if command is None else given[1:])
+    command = given.pop(0) if given[:1] and given[0] in COMMANDS else "mesh"
+    parser, work = COMMANDS[command]
+    options = parser().parse_args(given)
     try:
         with stoppable():
-            return run_training(options) if command is None else commands[command](options)
+            return work(options)
     except ImportError as error:
         if _is_leader():
             print(f"vm-train: {not_installed(error, 'train')}", file=sys.stderr)
@@ -75,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os._exit(EXIT_INTERRUPTED)  # ends the workers, too; a normal exit might wait for them forever
 
 
-def _how_to_continue(command: str | None, options: argparse.Namespace) -> str:
+def _how_to_continue(command: str, options: argparse.Namespace) -> str:
     """The end of a message about a stop: the command that continues a training, once its folder holds one."""
     if command not in _TRAININGS:
         return ""
@@ -90,14 +79,9 @@ def _is_leader() -> bool:
 
 
 def _resume(options: argparse.Namespace) -> int:
-    """Resume the training of a network or of a close look, or a fine-tuning."""
-    from ..look.run_folder import KIND as LOOK
-    from ..tuning.run_folder import KIND as TUNING
-
-    kind = kind_of(options.run)
-    if kind == TUNING:
-        return resume_fine_tuning(options)
-    return resume_look(options) if kind == LOOK else run_resume(options)
+    """Resume a training of any kind."""
+    resume = {"mesh": resume_mesh, "look": resume_look, "tune": resume_tune}
+    return resume[kind_of(options.run)](options)
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -136,26 +120,22 @@ def _preview(options: argparse.Namespace) -> int:
 
 
 def _rate(options: argparse.Namespace) -> int:
-    from pathlib import Path
-    from tempfile import TemporaryDirectory
-
     import torch
 
     from vm_export.mesh_networks import new_network
 
     from ..data.split import Split
-    from ..learning.hardware import set_up_hardware
     from ..learning.rate_finder import check_plot, find_rate, plot_rates
-    from ..learning.run_folder import begin_run
-    from ..learning.training_data import TrainingData
+    from ..learning.run import MeshRun
+    from ..runs.hardware import set_up_hardware
 
     configuration = read_configuration(options)
     if options.plot is not None:
         check_plot(options.plot, (options.config, *paths_of(find_pictures(options.data))))
-    with set_up_hardware(options.device, options.workers, options.threads) as hardware, TemporaryDirectory() as folder:
+    with set_up_hardware(options.device, options.workers, options.threads) as hardware:
         good = find_good_pictures(options.data, configuration, hardware, strict=False)
-        data = TrainingData(options.data, Split(tuple(each.number for each in good), (), ()))
-        run = begin_run(Path(folder) / "run", data, configuration)
+        split = Split(tuple(each.number for each in good), (), ())
+        run = MeshRun(options.data, {}, 1, split, options.data, configuration).with_counts()
         torch.manual_seed(configuration.training.seed)
         found = find_rate(run, hardware, new_network(configuration.network_shape), options.steps)
     for position in range(0, len(found.rates), max(len(found.rates) // 12, 1)):
@@ -167,8 +147,38 @@ def _rate(options: argparse.Namespace) -> int:
 
 
 def _config(options: argparse.Namespace) -> int:
-    print(to_commented_toml(TrainConfiguration(), HEADER), end="")
+    print(to_commented_toml(CONFIGURATIONS[options.kind](), header(options.kind)), end="")
     return EXIT_OK
+
+
+CONFIGURATIONS: dict[str, Callable[[], Any]] = {
+    "mesh": TrainConfiguration,
+    "look": LookConfiguration,
+    "tune": TuningConfiguration,
+}
+"""The configuration of each kind of training."""
+
+COMMANDS: dict[str, tuple[Callable[[], argparse.ArgumentParser], Callable[[argparse.Namespace], int]]] = {
+    "mesh": (mesh_parser, run_mesh),
+    "look": (look_parser, run_look),
+    "tune": (tune_parser, run_tune),
+    "resume": (resume_parser, _resume),
+    "check": (check_parser, _check),
+    "preview": (preview_parser, _preview),
+    "rate": (rate_parser, _rate),
+    "config": (config_parser, _config),
+    "import": (import_parser, run_import),
+    "import-boxes": (import_boxes_parser, run_import_boxes),
+}
+"""The parser and the work of each command; without one, vm-train trains a mesh network."""
+
+_TRAININGS = (*KINDS, "resume")
+"""Commands whose work vm-train resume continues."""
+
+
+def parsers() -> dict[str, argparse.ArgumentParser]:
+    """All parsers, by command."""
+    return {made.prog: made for made in (parser() for parser, _ in COMMANDS.values())}
 
 
 if __name__ == "__main__":

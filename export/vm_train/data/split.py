@@ -112,8 +112,7 @@ def split_beside(model: Path, data: Path) -> Split | None:
     """The split of the training that made a network of the pictures in `data`, if its files are beside the network."""
     with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
         if json.loads(read_regular(model.with_name("run.json")))["data"] == str(data.resolve()):
-            split = read_split(model.with_name("pictures.json"))
-            return split if split.training else None  # with none, it learned from a stream
+            return read_split(model.with_name("pictures.json"))
     return None
 
 

@@ -18,7 +18,7 @@ from vm_embedded.files import read_bytes
 from vm_embedded.output.box_files import overlap
 
 from ..boxes.box import Box, BoxedPicture
-from ..boxes.unlabeled import Sighting
+from ..boxes.unlabeled import FoundBox
 from ..scores.curves import without_nan
 from ..scores.object_ranking import Ranking
 from ..scores.object_scores import OVERLAPS, matches
@@ -41,11 +41,11 @@ class JudgedFrame:
 
     picture: BoxedPicture
     boxes: tuple[Box, ...]
-    found: tuple[Sighting, ...]
+    found: tuple[FoundBox, ...]
     matches: tuple[int | None, ...]
 
     @classmethod
-    def of(cls, picture: BoxedPicture, class_name: str, found: Sequence[Sighting]) -> JudgedFrame:
+    def of(cls, picture: BoxedPicture, class_name: str, found: Sequence[FoundBox]) -> JudgedFrame:
         """Judge what was found in a picture, in any order."""
         boxes = tuple(box for box in picture.boxes if box.name == class_name)
         ranked = tuple(sorted(found, key=lambda each: -each.probability))

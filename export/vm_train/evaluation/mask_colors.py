@@ -9,8 +9,8 @@ from vm_embedded.errors import InputError, unknown
 from vm_embedded.network.manifest import Manifest
 from vm_synth.dataset.files import CLASS_COLORS
 
+from ..data.class_table import ClassTable
 from ..data.classes import Classes, Color
-from ..learning.class_table import ClassTable
 
 
 def default_colors(model: Path, chosen: Path | None) -> Mapping[str, tuple[Color, ...]]:

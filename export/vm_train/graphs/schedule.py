@@ -46,9 +46,9 @@ def steps_an_epoch(training: int, batch: int) -> int:
 
 
 def schedule(
-    seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int, looks: int = 1
+    seed: tuple[int, ...], epochs: int, batch: int, training: int, validation: int, repeats: int = 1
 ) -> Iterator[Batch]:
-    """All batches of a training: each epoch uses all pictures `looks` times, shuffled, and then validates.
+    """All batches of a training: each epoch uses all pictures `repeats` times, shuffled, and then validates.
 
     training, validation: numbers of pictures. Positions below `training` are training pictures; the `validation`
     positions after them are validation pictures.
@@ -56,7 +56,7 @@ def schedule(
     step = 0
     for epoch in range(epochs):
         random = np.random.default_rng([*seed, _ORDER, epoch])
-        shuffled = np.concatenate([random.permutation(training) for _ in range(looks)])
+        shuffled = np.concatenate([random.permutation(training) for _ in range(repeats)])
         starts = range(0, len(shuffled), batch)
         for start in starts:
             step += 1

@@ -13,7 +13,7 @@ from vm_embedded.network.manifest import PEAK_OUTPUTS
 
 from ..graphs.labeled_graph import LabeledGraph
 from ..graphs.peak_targets import PeakTargets, peak_targets
-from .recipe import Recipe
+from .configuration import Recipe
 
 _SHARE, _WAY_SHARE = 0.1, 0.5
 """Weights of the losses of scores and ways, beside 1 for the loss of points."""

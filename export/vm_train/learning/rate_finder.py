@@ -17,8 +17,8 @@ from vm_export.mesh_networks import MeshNetwork
 
 from ..graphs.loading import load_batches
 from ..graphs.schedule import schedule
-from .hardware import Hardware
-from .run_folder import TrainingRun
+from ..runs.hardware import Hardware
+from .run import MeshRun
 from .trainer import Trainer
 
 LOWEST, HIGHEST = 1e-5, 3.0
@@ -39,13 +39,13 @@ class RateSearch:
         return float(self.rates[self.losses.argmin()]) / 3.0
 
 
-def find_rate(run: TrainingRun, hardware: Hardware, network: MeshNetwork, steps: int) -> RateSearch:
+def find_rate(run: MeshRun, hardware: Hardware, network: MeshNetwork, steps: int) -> RateSearch:
     """Train for up to `steps` steps, each with a higher rate, and with the point selection of the first round.
 
     Stops early when the loss diverges. Raises InputError if it is NaN or infinite.
     """
     recipe = replace(run.configuration.training, schedule="constant")
-    training = run.data.split.training
+    training = run.split.training
     epochs = -(-steps * recipe.batch // len(training))
     batches = list(schedule((recipe.seed, 0), epochs, recipe.batch, len(training), 0))[:steps]
     peaks = run.configuration.peak_numbers
@@ -56,8 +56,8 @@ def find_rate(run: TrainingRun, hardware: Hardware, network: MeshNetwork, steps:
     average = 0.0
     loaded = load_batches(run.graphs(training), batches, hardware.workers)
     for number, (batch, graphs) in enumerate(zip(batches, loaded, strict=False), 1):
-        trainer.set_rate(float(rates[number - 1]))
-        average = _SMOOTHING * average + (1.0 - _SMOOTHING) * trainer.step(batch.items, graphs).loss
+        trainer.rate = float(rates[number - 1])
+        average = _SMOOTHING * average + (1.0 - _SMOOTHING) * trainer.step(batch.items, graphs)["loss"]
         losses.append(average / (1.0 - _SMOOTHING**number))
         bar.advance()
         if not np.isfinite(losses[-1]) or losses[-1] > _DIVERGED * min(losses):

@@ -17,9 +17,23 @@ from vm_export.checkpoint import Checkpoint
 from vm_export.mesh_networks import MeshShape
 from vm_export.network_weights import network_of
 
-from .class_table import ClassTable
+from ..data.class_table import ClassTable
 from .configuration import TrainConfiguration
-from .same_mesh import check_same_mesh
+
+_MUST_MATCH = (
+    "shape",
+    "radius",
+    "object_height",
+    "intersections",
+    "mesh",
+    "edge",
+    "classes",
+    "any_radius",
+    "sampling",
+    "colors",
+)
+"""Entries of the manifests that two networks on one mesh share. The reach of the mesh may differ: near points are the
+same."""
 
 _RATE = 0.001
 """Default learning rate: with that of a training from random weights, the network would forget what it knows."""
@@ -66,7 +80,14 @@ class Start:
 
     def check(self, configuration: TrainConfiguration) -> None:
         """Raise InputError if a configuration describes a network with another mesh, other classes or layers."""
-        check_same_mesh(self.path, self.checkpoint, configuration.manifest, configuration.grid)
+        for name in _MUST_MATCH:
+            their_entry, own_entry = getattr(self.checkpoint.manifest, name), getattr(configuration.manifest, name)
+            if their_entry != own_entry:
+                raise InputError(f"{self.path} was trained with another {name}: {their_entry}, not {own_entry}")
+        if self.checkpoint.grid != configuration.grid:
+            raise InputError(
+                f"{self.path} was trained with another grid: {self.checkpoint.grid}, not {configuration.grid}"
+            )
         theirs, ours = self.checkpoint.network.shape, configuration.network_shape
         if theirs != ours:
             raise InputError(f"{self.path} has other layers: {_listed(theirs)}, not {_listed(ours)} as in [network]")

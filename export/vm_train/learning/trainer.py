@@ -1,51 +1,31 @@
-"""Trains a network step by step, and saves and loads the state between two steps.
+"""Trains a mesh network step by step.
 
-A step depends only on the seed, its number and the state before it: the weights and the state of the optimizer. With
-one computing thread on a CPU, a training that resumes from its last state therefore ends with the weights of one that
-nobody interrupted. With several processes (torch.distributed), each takes its part of every batch, and the gradient is
-that of the mean loss over the selected points of all parts.
+With several processes (torch.distributed), each takes its part of every batch, and the gradient is that of the mean
+loss over the selected points of all parts.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
-from torch import distributed, nn
 
 from vm_embedded.arrays import Floats, Singles
-from vm_embedded.errors import InputError, one_line
 from vm_export.mesh_networks import MeshNetwork
-from vm_export.torch_files import load_values, save_values
 
 from ..graphs.labeled_graph import LabeledGraph, join_graphs
 from ..graphs.schedule import Item
+from ..runs.hardware import sum_over_processes
+from ..runs.learner import Learner
+from ..runs.optimizer import ScheduledOptimizer
+from .configuration import Recipe
 from .loss import peak_losses, point_losses, targets_of
-from .optimizer import ScheduledOptimizer
-from .recipe import Recipe
 from .selection import class_totals, hardness_weights, point_errors, select_points
 
 _DRAWS = 2
 """Keeps the random numbers of the selection apart from others with the seed of the same item."""
-
-
-class DivergedError(InputError):
-    """The loss became NaN or infinite: to repeat the same steps would not help."""
-
-
-@dataclass(frozen=True)
-class StepResult:
-    """A step's number, from 1, the mean loss of its selected points, their number, and the learning rate."""
-
-    number: int
-    loss: float
-    points: int
-    rate: float
 
 
 @dataclass(frozen=True)
@@ -61,7 +41,7 @@ class _BatchLoss:
     points: int
 
 
-class Trainer:
+class Trainer(Learner[MeshNetwork]):
     """A network that is trained for `total` steps.
 
     shares (C,): chance that a point of each class is selected. weights (C,): weight of a selected point in the loss.
@@ -80,37 +60,26 @@ class Trainer:
         device: str = "cpu",
         peaks: Sequence[int] = (),
     ) -> None:
-        self.network = network.to(device).train()
-        self.recipe, self.total, self.done = recipe, total, 0
-        self._shares, self._device, self._peaks = shares, device, tuple(peaks)
+        network = network.to(device).train()
+        optimizer = ScheduledOptimizer(network, recipe.optimizer, recipe.rate, recipe.decay, total, recipe.schedule)
+        super().__init__(network, optimizer, total, device)
+        self.recipe, self._shares, self._peaks = recipe, shares, tuple(peaks)
         self._weights = torch.from_numpy(weights.astype(np.float32)).to(device)
         self._graders = [each.to(device).eval() for each in graders]
-        self._optimizer = ScheduledOptimizer(self.network, recipe, total)
 
-    def set_rate(self, rate: float) -> None:
-        """Set the learning rate of the next step. Any schedule but a constant one replaces it after that step."""
-        self._optimizer.rate = rate
+    def step(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> dict[str, float]:
+        """Learn from this process's part of a batch. Raises DivergedError if the loss is NaN or infinite.
 
-    def step(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> StepResult:
-        """Learn from this process's part of a batch. Raises DivergedError if the loss is NaN or infinite."""
-        rate = self._optimizer.rate
-        part = self._batch_loss(items, graphs)
+        Returns the mean loss of the selected points, their number, and the learning rate.
+        """
+        rate, part = self.rate, self._batch_loss(items, graphs)
         weights = sum_over_processes(part.weights)
         weights = torch.where(weights > 0.0, weights, 1.0)
         mean = float((sum_over_processes(part.losses.detach().cpu()) / weights).sum())
-        if not math.isfinite(mean):
-            raise DivergedError(
-                f"the loss of step {self.done + 1} is NaN or infinite: begin again with a lower training.rate"
-            )
-        self._optimizer.zero_grad()
-        if part.points:
-            (part.losses / weights.to(part.losses.device)).sum().backward()  # type: ignore[no-untyped-call]
-        _sum_gradients(self.network)
-        if self.recipe.clip:
-            nn.utils.clip_grad_norm_(self.network.parameters(), self.recipe.clip)
-        self._optimizer.step()
-        self.done += 1
-        return StepResult(self.done, mean, int(sum_over_processes(torch.tensor(part.points))), rate)
+        loss = (part.losses / weights.to(part.losses.device)).sum() if part.points else None
+        self.learn(mean, loss, self.recipe.clip)
+        points = int(sum_over_processes(torch.tensor(part.points)))
+        return {"loss": mean, "points": points, "rate": rate}
 
     def _batch_loss(self, items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> _BatchLoss:
         if not any(map(len, graphs)):  # a small batch may leave this process nothing, and a camera may see nothing
@@ -158,45 +127,6 @@ class Trainer:
         answers: Singles = answer[:-1].cpu().numpy()
         return answers
 
-    def save(self, path: Path, more: Mapping[str, Any]) -> None:
-        """Write the state to resume from, with `more` plain values. Raises InputError if it can't be written."""
-        state = {
-            "done": self.done,
-            "network": self.network.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
-            "more": dict(more),
-        }
-        save_values(path, state)
-
-    def load(self, state: Mapping[str, Any]) -> None:
-        """Resume from a state that `read_state` read. Raises InputError if it belongs to another training."""
-        try:
-            self.network.load_state_dict(state["network"])
-            self._optimizer.load_state_dict(state["optimizer"])
-            self.done = int(state["done"])
-        except (RuntimeError, KeyError, ValueError, TypeError) as error:
-            raise InputError(f"the state belongs to another training: {one_line(error)}") from error
-
-
-def read_state(path: Path) -> dict[str, Any]:
-    """Read the file of `Trainer.save` without executing anything in it. Raises InputError."""
-    try:
-        state = load_values(path, "the state of a training")
-    except InputError as error:
-        raise InputError(f"can't resume: {error}; begin again in a new folder") from error
-    if not isinstance(state, dict) or not isinstance(state.get("more"), dict):
-        raise InputError(f"can't resume from {path}: it is not the state of a training; begin again in a new folder")
-    return state
-
-
-def sum_over_processes(value: torch.Tensor) -> torch.Tensor:
-    """The sum of all processes' values, on the CPU; every process gets it."""
-    if not distributed.is_initialized():
-        return value
-    total = value.to("cuda" if distributed.get_backend() == "nccl" else "cpu")  # nccl sends tensors of GPUs only
-    distributed.all_reduce(total)
-    return total.cpu()
-
 
 def _draws(items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> Floats:
     """A random number from 0 to 1 for each point of a batch, decided by the seeds of its items."""
@@ -206,11 +136,3 @@ def _draws(items: Sequence[Item], graphs: Sequence[LabeledGraph]) -> Floats:
             for item, each in zip(items, graphs, strict=True)
         ]
     )
-
-
-def _sum_gradients(network: nn.Module) -> None:
-    """Give every process the sum of all processes' gradients."""
-    if distributed.is_initialized():
-        for each in network.parameters():
-            each.grad = torch.zeros_like(each) if each.grad is None else each.grad
-            distributed.all_reduce(each.grad)

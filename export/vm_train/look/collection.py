@@ -14,10 +14,10 @@ from vm_embedded.errors import GeometryError, InputError
 
 from .chunks import collect_chunks
 from .labels import OBJECT, UNLABELED, VISIBLE, label_places
-from .observing import Item, Observer, items_of
+from .observing import Observer, RunPicture, items_of
 from .patch_set import PatchChunk, PatchSet
 from .places import jittered_places, proposed_places, random_places
-from .run_folder import LookRun
+from .run import LookRun
 
 CHUNK = 100
 """Pictures in a file of patches."""
@@ -35,7 +35,7 @@ class Collector:
         """The collector of a run. Raises InputError or ModelError."""
         return cls(run, Observer.of(run))
 
-    def __call__(self, item: Item) -> PatchChunk:
+    def __call__(self, item: RunPicture) -> PatchChunk:
         """The patches of a picture; none, and a fault, if it can't be used. In a strict run, raises InputError then."""
         try:
             return self._collect(item)
@@ -48,7 +48,7 @@ class Collector:
                 ) from error
             return PatchChunk(PatchSet.empty(self.run.configuration.patches.size), 0, 0, (fault,))
 
-    def _collect(self, item: Item) -> PatchChunk:
+    def _collect(self, item: RunPicture) -> PatchChunk:
         settings, seen = self.run.configuration.patches, self.observer.observe(item.files)
         observation, truths, view = seen.observation, seen.truths, seen.observation.view
         places = proposed_places(view, seen.peaks, settings)
@@ -78,7 +78,7 @@ def collect_patches(run: LookRun, workers: int, report: Callable[[int], None]) -
     that are already in the folder stay. Raises InputError if a picture is missing, or, in a strict run, can't be used;
     VisualMeshError if a worker was killed.
     """
-    return collect_chunks(items_of(run), partial(Collector.of, run), CHUNK, run.patches, "", workers, report)
+    return collect_chunks(items_of(run), partial(Collector.of, run), CHUNK, run.patches, workers, report)
 
 
 def random_of(seed: int, picture: str) -> np.random.Generator:

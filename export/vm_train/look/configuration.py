@@ -10,8 +10,8 @@ from vm_embedded.config.entries import check_entries, entry, number, one_of, sha
 from vm_embedded.errors import InputError
 from vm_workstation.ranges import range_of
 
-from ..learning.class_table import ClassTable
-from ..learning.recipe import OPTIMIZERS
+from ..data.class_table import ClassTable
+from ..runs.configuration import OPTIMIZERS
 
 if TYPE_CHECKING:
     from vm_export.look_network import LookShape
@@ -172,13 +172,6 @@ class PatchAugmentation:
 
     def __post_init__(self) -> None:
         check_entries(self)
-
-
-LOOK_HEADER = """Configuration of vm-train look. `vm-train look-config` prints this file.
-Keep only the entries that you change: missing entries have their defaults.
-Each comment gives the meaning of the next entry, its unit in brackets, and its limits.
-An entry [low, high] is a range: each patch gets a random value between the two."""
-"""First comment of a look.toml that is printed."""
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,8 @@ from vm_workstation.worker_process import results_of
 
 from ..scores.calibration import logits_from
 from .labels import OBJECT, UNLABELED, VISIBLE, label_places
-from .observing import Item, Observer, items_of
-from .run_folder import LookRun
+from .observing import Observer, RunPicture, items_of
+from .run import LookRun
 from .torch_look import TorchLook
 
 
@@ -63,7 +63,7 @@ class Judge:
         """The judge of a run. network: not calibrated yet. Raises InputError or ModelError."""
         return cls(Observer.of(run), TorchLook(network, contract), Settings(min_confidence=0.0))
 
-    def __call__(self, item: Item) -> Found:
+    def __call__(self, item: RunPicture) -> Found:
         """The objects in a picture; none if it can't be used."""
         try:
             seen = self.observer.observe(item.files)
@@ -90,18 +90,16 @@ def shown_before(objects: npt.NDArray[np.int64]) -> Mask:
 
 
 def judge_validation(
-    run: LookRun, network: LookNetwork, contract: LookContract, workers: int, stop: Callable[[int], bool]
-) -> Found | None:
+    run: LookRun, network: LookNetwork, contract: LookContract, workers: int, report: Callable[[int], None]
+) -> Found:
     """What is found in the validation pictures of a run, with so many processes; 1 uses only this process.
 
-    stop: gets the number of pictures that are done; if it returns True, this returns None. Raises InputError and
-    VisualMeshError.
+    report: is called with the number of pictures that are done. Raises InputError and VisualMeshError.
     """
     items = [each for each in items_of(run) if each.validates]
     parts: list[Found] = []
     with closing(results_of(partial(Judge.of, run, network, contract), items, workers)) as results:
         for part in results:
             parts.append(part)
-            if stop(len(parts)):
-                return None
+            report(len(parts))
     return Found.joined(parts)

@@ -18,11 +18,11 @@ from ..evaluation.answers import ExactSubject
 from ..truth.field import read_field
 from ..truth.objects import SceneTruth, read_scene
 from .labels import Truths, find_truths, true_bases
-from .run_folder import LookRun
+from .run import LookRun
 
 
 @dataclass(frozen=True)
-class Item:
+class RunPicture:
     """A picture: its files, its position in the run's list, and whether it is for validation."""
 
     files: PictureFiles
@@ -30,7 +30,7 @@ class Item:
     validates: bool
 
 
-def items_of(run: LookRun) -> list[Item]:
+def items_of(run: LookRun) -> list[RunPicture]:
     """All pictures of a run. Raises InputError if the folder lost one."""
     files = {each.number: each for each in find_pictures(run.data)}
     lost = [number for number in run.numbers if number not in files]
@@ -40,7 +40,7 @@ def items_of(run: LookRun) -> list[Item]:
             "their folder with --data"
         )
     validation = set(run.split.validation)
-    return [Item(files[number], position, number in validation) for position, number in enumerate(run.numbers)]
+    return [RunPicture(files[number], position, number in validation) for position, number in enumerate(run.numbers)]
 
 
 @dataclass(frozen=True, eq=False)

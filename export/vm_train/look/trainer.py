@@ -1,16 +1,8 @@
-"""Trains a look network step by step, and saves and loads the state between two steps.
-
-A step depends only on the seed, its number and the weights before it. So a training that resumes from its last state
-ends with the same weights.
-"""
+"""Trains a look network step by step."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from time import perf_counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,14 +11,11 @@ import torch
 from torch.nn import functional
 
 from vm_embedded.arrays import Floats
-from vm_embedded.cli.progress import ProgressBar
-from vm_embedded.errors import InputError, one_line
+from vm_embedded.errors import InputError
 from vm_export.look_network import LookNetwork
-from vm_export.torch_files import save_values
 
-from ..learning.log import TrainingLog
-from ..learning.optimizer import ScheduledOptimizer
-from ..learning.recipe import Recipe
+from ..runs.learner import Learner
+from ..runs.optimizer import ScheduledOptimizer
 from .augmentation import augment
 from .configuration import LookRecipe, PatchAugmentation
 from .labels import OBJECT
@@ -37,21 +26,8 @@ from .teacher import LookTeacher
 _PRECISE = 0.1
 """Errors of center and size above this have an absolute instead of a squared loss."""
 
-_SAVE_INTERVAL = 30.0
-"""Time between two states [s]."""
 
-
-@dataclass(frozen=True)
-class LookStep:
-    """A step's number, from 1, its losses of presence and of place and size, and the learning rate."""
-
-    number: int
-    presence: float
-    place: float
-    rate: float
-
-
-class LookTrainer:
+class LookTrainer(Learner[LookNetwork]):
     """A network that is trained for `total` steps on patches.
 
     extent: half the side of a patch [expected radii]. weights (n,): how often each patch is drawn, compared to others
@@ -70,9 +46,11 @@ class LookTrainer:
         teacher: LookTeacher | None = None,
         device: str = "cpu",
     ) -> None:
-        self.network, self._device = network.to(device).train(), device
-        self.recipe, self.total, self.done = recipe, total, 0
-        self._augmentation, self._patches, self._extent = augmentation, patches, extent
+        network = network.to(device).train()
+        super().__init__(
+            network, ScheduledOptimizer(network, recipe.optimizer, recipe.rate, recipe.decay, total), total, device
+        )
+        self.recipe, self._augmentation, self._patches, self._extent = recipe, augmentation, patches, extent
         self._images, self._targets = torch.from_numpy(patches.patches), torch.from_numpy(patches.targets)
         self._with, self._without = (np.flatnonzero((patches.labels == OBJECT) == each) for each in (True, False))
         for chosen, what in ((self._with, "shows an object"), (self._without, "shows no object")):
@@ -83,14 +61,6 @@ class LookTrainer:
         self._shown_chances, self._chances = (
             None if weights is None else np.cumsum(weights[rows]) for rows in (self._with, self._without)
         )
-        self._optimizer = ScheduledOptimizer(
-            network, Recipe(optimizer=recipe.optimizer, rate=recipe.rate, decay=recipe.decay), total
-        )
-
-    @property
-    def rate(self) -> float:
-        """The learning rate of the next step."""
-        return self._optimizer.rate
 
     def grade(self) -> None:
         """Draw patches without an object by the network's errors from now on."""
@@ -104,9 +74,12 @@ class LookTrainer:
         chances = errors.astype(np.float64) + self.recipe.floor
         self._chances = np.cumsum(chances if self._weights is None else chances * self._weights[self._without])
 
-    def step(self) -> LookStep:
-        """Learn from one batch. Raises InputError if the loss is NaN or infinite."""
-        rate = self._optimizer.rate
+    def step(self) -> dict[str, float]:
+        """Learn from one batch. Raises DivergedError if the loss is NaN or infinite.
+
+        Returns the loss and its parts, of presence and of place and size, and the learning rate.
+        """
+        rate = self.rate
         chosen, shown = self._draw(np.random.default_rng([self.recipe.seed, 1, self.done]))
         random = torch.Generator().manual_seed(_seed(self.recipe.seed, 2, self.done))
         images, targets = self._images[chosen].to(self._device), self._targets[chosen].to(self._device)
@@ -118,15 +91,9 @@ class LookTrainer:
         errors = functional.smooth_l1_loss(answers[:, 1:], targets, reduction="none", beta=_PRECISE).sum(dim=1)
         place = (errors * shown).sum() / shown.sum()
         loss = presence + place
-        if not math.isfinite(loss.item()):
-            raise InputError(
-                f"the loss of step {self.done + 1} is NaN or infinite: begin again with a lower training.rate"
-            )
-        self._optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        self._optimizer.step()
-        self.done += 1
-        return LookStep(self.done, presence.item(), place.item(), rate)
+        self.learn(loss.item(), loss)
+        parts = {"presence": presence.item(), "place": place.item()}
+        return {"loss": parts["presence"] + parts["place"], **parts, "rate": rate}
 
     def _draw(self, random: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
         """Positions (batch,) of the patches of a step, and whether each shows an object (1) or not (0)."""
@@ -136,62 +103,16 @@ class LookTrainer:
         others = _drawn(self._without, self._chances, batch - count, random)
         return torch.from_numpy(np.concatenate([shown, others])), (torch.arange(batch) < count).float()
 
-    def save(self, path: Path, more: Mapping[str, Any]) -> None:
-        """Write the state to resume from, with `more` plain values. Raises InputError if it can't be written."""
-        state = {
-            "done": self.done,
-            "network": self.network.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
-            "errors": None if self._errors is None else torch.from_numpy(self._errors),
-            "more": dict(more),
-        }
-        save_values(path, state)
+    def state(self) -> dict[str, Any]:
+        """The state to resume from: plain values and tensors."""
+        return super().state() | {"errors": None if self._errors is None else torch.from_numpy(self._errors)}
 
-    def load(self, state: Mapping[str, Any]) -> None:
-        """Resume from a state that `read_state` read. Raises InputError if it belongs to another training."""
-        try:
-            self.network.load_state_dict(state["network"])
-            self._optimizer.load_state_dict(state["optimizer"])
-            if state["errors"] is not None:
-                if len(state["errors"]) != len(self._without):
-                    raise ValueError("it has another number of patches")
-                self._set_errors(state["errors"].numpy())
-            self.done = int(state["done"])
-        except (RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
-            raise InputError(f"the state belongs to another training: {one_line(error)}") from error
-
-
-def train_epoch(
-    trainer: LookTrainer,
-    epoch: int,
-    steps: int,
-    log: TrainingLog,
-    bar: ProgressBar,
-    save: Callable[[], None],
-    stop_requested: Callable[[], bool],
-) -> str | None:
-    """Train the rest of an epoch, counted from 1, of so many steps.
-
-    Returns mean loss, learning rate and time left, in words; None after a stop. save: writes the state, now and then
-    and at a stop. Raises InputError if the loss is NaN or infinite.
-    """
-    saved, all_losses = perf_counter(), []
-    while trainer.done < epoch * steps:
-        step = trainer.step()
-        losses = {"loss": step.presence + step.place, "presence": step.presence, "place": step.place}
-        log.write(step.number, losses | {"rate": step.rate})
-        all_losses.append(losses["loss"])
-        bar.note = f"epoch {epoch}, loss {losses['loss']:.3f}"
-        bar.advance()
-        if stop_requested():
-            bar.clear()
-            save()
-            return None
-        if perf_counter() - saved > _SAVE_INTERVAL:
-            save()
-            saved = perf_counter()
-    loss = f"loss {np.mean(all_losses):.3f}, " if all_losses else ""  # none after a stop before a validation
-    return f"{loss}learning rate {trainer.rate:.2g}, {bar.left}"
+    def _load(self, state: Mapping[str, Any]) -> None:
+        super()._load(state)
+        if state["errors"] is not None:
+            if len(state["errors"]) != len(self._without):
+                raise ValueError("it has another number of patches")
+            self._set_errors(state["errors"].numpy())
 
 
 def _drawn(

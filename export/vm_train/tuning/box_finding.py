@@ -29,7 +29,7 @@ from vm_workstation.worker_process import results_of
 
 from ..boxes.box import Box, BoxedPicture
 from ..boxes.checked_boxes import is_cut
-from ..boxes.unlabeled import Sighting
+from ..boxes.unlabeled import FoundBox
 from ..evaluation.box_scores import BoxScores, JudgedFrame
 from .boxed_objects import all_objects
 from .candidates import search_radii, seen_objects
@@ -47,7 +47,7 @@ LOOK_ALONE = (
 WHOLE_DETECTOR = "Measured: the whole detector, with lens and pose of each frame."
 """What the scores are of."""
 
-Finder = Callable[[BoxedPicture], list[Sighting]]
+Finder = Callable[[BoxedPicture], list[FoundBox]]
 """Finds the objects of a class in a frame. Raises InputError if it can't be used, and ModelError."""
 
 
@@ -106,7 +106,7 @@ def judged_class(manifest: Manifest, model: str) -> str:
     return names[0]
 
 
-def _found_by_detector(detector: Detector, name: str, frame: BoxedPicture) -> list[Sighting]:
+def _found_by_detector(detector: Detector, name: str, frame: BoxedPicture) -> list[FoundBox]:
     assert frame.lens is not None
     camera = read_lens_file(frame.lens)
     try:
@@ -114,19 +114,19 @@ def _found_by_detector(detector: Detector, name: str, frame: BoxedPicture) -> li
     except GeometryError as error:
         raise InputError(f"{frame.lens}: {error}") from error
     return [
-        Sighting(frame.image, Box(name, *(edges - 0.5).tolist()), each.confidence)
+        FoundBox(frame.image, Box(name, *(edges - 0.5).tolist()), each.confidence)
         for each, edges in zip(found, found.xyxy, strict=True)
     ]
 
 
-def _found_by_look(look: Look, search: Search, frame: BoxedPicture) -> list[Sighting]:
+def _found_by_look(look: Look, search: Search, frame: BoxedPicture) -> list[FoundBox]:
     pyramid = Pyramid(read_image(frame.image), "bgr")
     windows, probabilities = seen_objects(pyramid, frame.size, look, search.radii, _ABOVE, _CANDIDATES)
     half = windows.radii[:, None] * (1.0, search.aspect)
     ends = np.array(frame.size) - 0.5
     edges = np.hstack([(windows.centers - half).clip(-0.5, ends), (windows.centers + half).clip(-0.5, ends)])
     return [
-        Sighting(frame.image, Box(look.contract.object_class, *each), probability)
+        FoundBox(frame.image, Box(look.contract.object_class, *each), probability)
         for each, probability in zip(edges.tolist(), probabilities.tolist(), strict=True)
         if probability >= _LOWEST
     ]

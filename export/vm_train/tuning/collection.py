@@ -21,7 +21,7 @@ from ..look.torch_look import TorchLook
 from .boxed_objects import objects_of
 from .candidates import find_candidates
 from .configuration import WindowSettings
-from .run_folder import TuningRun, tuned_look
+from .run import TuningRun, tuned_look
 from .windows import Windows, jittered_windows, random_windows
 
 CHUNK = 20
@@ -37,7 +37,7 @@ class Frame:
 
 
 @dataclass(frozen=True, eq=False)
-class Collector:
+class WindowCollector:
     """Cuts the patches of a frame. look: the network before the fine-tuning. radii (s,): of objects [px]."""
 
     look: TorchLook
@@ -47,7 +47,7 @@ class Collector:
     is_round: bool
 
     @classmethod
-    def of(cls, run: TuningRun) -> Collector:
+    def of(cls, run: TuningRun) -> WindowCollector:
         """The collector of a run. Raises InputError or ModelError."""
         before = tuned_look(run.before)
         look = TorchLook(before.network, before.contract)
@@ -78,6 +78,7 @@ def collect_windows(run: TuningRun, workers: int, report: Callable[[int], None])
     InputError, and VisualMeshError if a worker was killed.
     """
     frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
-    paths = collect_chunks(frames, partial(Collector.of, run), CHUNK, run.folder / "patches", "", workers, report)
+    make, folder = partial(WindowCollector.of, run), run.folder / "patches"
+    paths = collect_chunks(frames, make, CHUNK, folder, workers, report)
     size = tuned_look(run.before).contract.size
     return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])

@@ -92,13 +92,6 @@ class TuningRecipe:
         )
 
 
-TUNING_HEADER = """Configuration of vm-train look --boxes. `vm-train tune-config` prints this file.
-Keep only the entries that you change: missing entries have their defaults.
-Each comment gives the meaning of the next entry, its unit in brackets, and its limits.
-An entry [low, high] is a range: each patch gets a random value between the two."""
-"""First comment of a tune.toml that is printed."""
-
-
 @dataclass(frozen=True)
 class TuningConfiguration:
     """All sections."""

@@ -12,7 +12,7 @@ from vm_embedded.network.look_contract import LookContract
 
 from ..look.labels import NOTHING, OBJECT
 from ..look.patch_set import PatchChunk, PatchSet
-from ..look.run_folder import read_look_run
+from ..look.run import read_look_run
 from .rendered_patches import RENDERED, write_rendered
 
 _CLASS = "ball"

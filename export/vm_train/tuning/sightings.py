@@ -9,7 +9,7 @@ from vm_embedded.detection.looking import Look
 from vm_embedded.detection.pyramid import Pyramid
 
 from ..boxes.box import Box, BoxedPicture
-from ..boxes.unlabeled import Sighting
+from ..boxes.unlabeled import FoundBox
 from .boxed_objects import all_objects
 from .candidates import search_radii, seen_objects
 
@@ -21,7 +21,7 @@ _ABOVE, _CANDIDATES = 0.1, 20
 
 def clear_sightings(
     look: Look, pictures: Sequence[BoxedPicture], is_round: bool, report: Callable[[], None]
-) -> Iterator[Sighting]:
+) -> Iterator[FoundBox]:
     """The objects of the look's class that it sees clearly, as large as those that have boxes.
 
     report: is called after each picture. Raises InputError for an image that can't be read, and ModelError.
@@ -37,5 +37,5 @@ def clear_sightings(
         for (x, y), radius, probability in zip(windows.centers, windows.radii, probabilities, strict=True):
             if probability >= CLEAR:
                 box = Box(name, x - radius, y - radius, x + radius, y + radius)
-                yield Sighting(picture.image, box, float(probability))
+                yield FoundBox(picture.image, box, float(probability))
         report()

@@ -1,31 +1,40 @@
-"""Training of a fine-tuning: a network learns from the user's patches and from rendered ones, and the best epoch stays.
+"""Fine-tunes the close look of a model file on boxed frames.
 
-Patches without an object are drawn by the network's errors, which it learns at the beginning and in the middle.
+It learns from the user's patches and from rendered ones, and the best epoch stays. Patches without
+an object are drawn by the network's errors, which it learns at the beginning and in the middle.
 """
 
 from __future__ import annotations
 
 import copy
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 import torch
 
+from vm_embedded import __version__
 from vm_embedded.arrays import Floats
-from vm_embedded.cli.progress import ProgressBar
-from vm_export.look_checkpoint import LookCheckpoint
+from vm_embedded.borders.text import printable
+from vm_embedded.detection.settings import Settings
+from vm_embedded.files import write_file
+from vm_export.attach_look import attached
 from vm_export.look_network import LookNetwork
 
-from ..learning.log import TrainingLog
-from ..learning.trainer import read_state
+from ..evaluation.box_report import box_page, found_of
 from ..look.patch_set import PatchSet
 from ..look.teacher import LookTeacher
-from ..look.trainer import LookTrainer, train_epoch
+from ..look.trainer import LookTrainer
+from ..runs.hardware import Hardware
+from ..runs.loop import Progress, Training, Validation, shown
+from .box_finding import LOOK_ALONE, Search, Trial
+from .boxed_objects import divided
+from .collection import collect_windows
 from .mixing import Mixer
-from .run_folder import TuningRun
+from .rendered_patches import read_rendered
+from .run import TuningRun, tuned_look
 
 _RENDERED_VALIDATION = 5
 """One of so many rendered patches is for validation."""
@@ -59,105 +68,130 @@ class TuningPatches:
         return patches, weights
 
 
-@dataclass
-class TuningProgress:
-    """How far a fine-tuning is, besides its weights; state.pt keeps these entries.
+class Tuning(Training):
+    """See runs.loop.Training. `kept` is the network of its best epoch."""
 
-    validated: number of validated epochs. best: the lowest loss of the user's frames; best_epoch: its epoch, from 1,
-    or 0.
-    """
+    run: TuningRun
+    learner: LookTrainer
+    rounds = 1
 
-    validated: int = 0
-    best: float = math.inf
-    best_epoch: int = 0
+    def __init__(self, run: TuningRun, hardware: Hardware) -> None:
+        self.run, self._workers, recipe = run, hardware.workers, run.configuration.training
+        super().__init__()
+        self.epochs, self.steps, self.patience = range(recipe.epochs), recipe.steps, recipe.patience
 
-
-def train_tuned(
-    run: TuningRun, before: LookCheckpoint, patches: TuningPatches, stop_requested: Callable[[], bool]
-) -> LookNetwork | None:
-    """Train a network from `before` on, and calibrate it. Returns None after a stop. Raises InputError."""
-    state = read_state(run.state_path) if run.state_path.exists() else None
-    return _Training(run, before, patches, state).run(stop_requested)
-
-
-class _Training:
-    """A training in work, from its last state on."""
-
-    def __init__(
-        self, run: TuningRun, before: LookCheckpoint, patches: TuningPatches, state: Mapping[str, Any] | None
-    ) -> None:
-        self._run, self._patches = run, patches
-        settings = run.configuration
-        self._recipe = settings.training
-        self._total = self._recipe.epochs * self._recipe.steps
-        training, weights = patches.for_training(self._recipe.own)
+    def begin(self, progress: Progress, stopped: Callable[[], bool]) -> None:
+        """Collect the patches, and prepare the network."""
+        run, settings, recipe = self.run, self.run.configuration, self.run.configuration.training
+        self._progress, self._stopped = progress, stopped
+        self._before = before = tuned_look(run.before)
+        with shown(len(run.pictures), stopped) as report:
+            own = collect_windows(run, self._workers, report)
+        self._patches = patches = TuningPatches.of(run, own, read_rendered(run.rendered_path, before.contract.size))
+        self._digest = own.sha256()
+        training, weights = patches.for_training(recipe.own)
         network, old = copy.deepcopy(before.network), before.network.eval()
-        self._mixer = Mixer(old, patches.rendered_validation, self._recipe.forgetting)
+        self._mixer = Mixer(old, patches.rendered_validation, recipe.forgetting)
         is_rendered = torch.arange(len(training)) >= len(patches.own)
-        teacher = LookTeacher(old, self._recipe.distillation * is_rendered)
-        recipe = self._recipe.as_look_recipe()
-        self._trainer = LookTrainer(
-            network, training, before.contract.extent, recipe, settings.augmentation, self._total, weights, teacher
+        teacher = LookTeacher(old, recipe.distillation * is_rendered)
+        self.learner = LookTrainer(
+            network,
+            training,
+            before.contract.extent,
+            recipe.as_look_recipe(),
+            settings.augmentation,
+            recipe.epochs * recipe.steps,
+            weights,
+            teacher,
         )
-        self._progress, self._best = TuningProgress(), _copy(network)
-        if state is not None:
-            self._trainer.load(state)
-            self._progress = TuningProgress(**state["more"]["progress"])
-            self._best = dict(state["more"]["best"])
-        self._bar = ProgressBar(self._total, "vm-train", self._trainer.done)
+        self.kept = _copy(network)
+        mine = patches.own
+        print(f"{len(mine)} patches of your frames, {mine.objects} of them show the object", flush=True)
 
-    def run(self, stop_requested: Callable[[], bool]) -> LookNetwork | None:
-        """Train until the end or a stop, and return the calibrated network of the best epoch; None after a stop."""
-        own = self._patches.own
-        print(f"{len(own)} patches of your frames, {own.objects} of them show the object", flush=True)
-        with TrainingLog(self._run.folder, 1, self._trainer.done, self._progress.validated) as log:
-            while self._progress.validated < self._recipe.epochs and not self._is_late():
-                if not self._train_epoch(log, stop_requested):
-                    return None
-        self._bar.clear()
-        network = self._trainer.network.eval()
-        network.load_state_dict(self._best)
-        return network
+    def step(self) -> dict[str, float]:
+        """Learn from the next batch."""
+        if self.learner.done in (0, self.epochs.stop // 2 * self.steps):
+            self.learner.grade()
+        return self.learner.step()
 
-    def _is_late(self) -> bool:
-        """Whether the validation has not become better for too long."""
-        return self._progress.validated - self._progress.best_epoch >= self._recipe.patience
-
-    def _train_epoch(self, log: TrainingLog, stop_requested: Callable[[], bool]) -> bool:
-        """Train the rest of an epoch, and validate. Returns False after a stop."""
-        epoch = self._progress.validated
-        if self._trainer.done == epoch * self._recipe.steps and epoch in (0, self._recipe.epochs // 2):
-            self._trainer.grade()
-        learned = train_epoch(self._trainer, epoch + 1, self._recipe.steps, log, self._bar, self._save, stop_requested)
-        if learned is None:
-            return False
-        self._validate(log, learned)
-        self._save()
-        return True
-
-    def _validate(self, log: TrainingLog, learned: str) -> None:
+    def validate(self) -> Validation:
         """Keep the network, mixed with the one before, if it is better on the user's frames than those so far.
 
-        Without frames for validation, the last one stays. learned: about the training of the epoch, to print.
+        Without frames for validation, the last one stays.
         """
-        mixture = self._mixer.mix(self._trainer.network)
+        mixture = self._mixer.mix(self.learner.network)
         own = mixture.loss_of(self._patches.own_validation)
-        self._progress.validated += 1
-        if math.isnan(own) or own < self._progress.best:
-            self._progress.best, self._progress.best_epoch = own, self._progress.validated
-            self._best = _copy(mixture.network)
-        record = {"epoch": self._progress.validated, "own": own, "rendered": mixture.loss, "share": mixture.share}
-        log.write(self._trainer.done, record)
-        self._bar.clear()
-        yours = "" if math.isnan(own) else f"{own:.3f} for your frames, "
-        print(
-            f"epoch {self._progress.validated} of {self._recipe.epochs}: validation loss {yours}"
-            f"{mixture.loss:.3f} for rendered patches, with {mixture.share:.0%} of the new weights; {learned}",
-            flush=True,
+        if self._progress.is_best(-own):
+            self.kept = _copy(mixture.network)
+            self._progress.take(-own)
+        yours = "" if np.isnan(own) else f"{own:.3f} for your frames, "
+        return Validation(
+            {"own": own, "rendered": mixture.loss, "share": mixture.share},
+            f"validation loss {yours}{mixture.loss:.3f} for rendered patches",
+            f", with {mixture.share:.0%} of the new weights",
         )
 
-    def _save(self) -> None:
-        self._trainer.save(self._run.state_path, {"progress": asdict(self._progress), "best": self._best})
+    def finish(self) -> None:
+        """Write the network of the best epoch, the model file and the report."""
+        before, network = self._before, self.learner.network.eval()
+        network.load_state_dict(self.kept)
+        contract = replace(before.contract, provenance=self._provenance())
+        look = replace(before, network=network, contract=contract)
+        look.save(self.run.look_path)
+        content, _ = attached(self.run.before.content, self.run.before.manifest, look)
+        write_file(self.run.result_path, content)
+        self._measure()
+
+    def _provenance(self) -> dict[str, str]:
+        """Where the network comes from, for its contract."""
+        run = self.run
+        return dict(self._before.contract.provenance) | {
+            "fine_tuned_by": f"vm-train {__version__}",
+            "fine_tuned_on": printable(run.boxes.folder.name),
+            "fine_tuned_frames": str(len(run.split.training)),
+            "fine_tuned_patches_sha256": self._digest,
+            "fine_tuned_from_sha256": run.before.sha256,
+            "fine_tuned_seed": str(run.configuration.training.seed),
+        }
+
+    def _measure(self) -> None:
+        """Write and print what the networks before and after find in the held-out frames."""
+        run, frames = self.run, self.run.part(self.run.held_out)
+        search = Search.of(run.pictures, run.object_class, run.is_round)
+        models, done = {"before": run.before.path, "after": run.result_path}, count(1)
+        with shown(2 * len(frames), self._stopped) as report:
+            scores = [
+                Trial(name, path, Settings(), search).scores(
+                    frames, run.object_class, self._workers, lambda: report(next(done))
+                )
+                for name, path in models.items()
+            ]
+        tables = {each.name: each.as_dict() for each in scores}
+        write_file(run.folder / "result.json", json.dumps(tables, indent=1) + "\n")
+        title = f"{run.boxes.folder.name}: {run.object_class}"
+        write_file(run.folder / "report.html", box_page(title, _about(run), scores))
+        if not frames:
+            print(f"{run.result_path}: not measured, because no frames were held out")
+            return
+        part = "the test" if run.split.test else "validation"
+        print(f"{run.result_path}: in {len(frames)} frames for {part}, it finds {found_of(scores[1])}")
+        print(f"before the fine-tuning: {found_of(scores[0])}")
+
+
+def _about(run: TuningRun) -> list[str]:
+    """What the report measures."""
+    learned = f"The close look of {run.model} learned from {len(run.split.training)} frames of {run.boxes.folder.name}."
+    frames = run.part(run.held_out)
+    if not frames:
+        return [learned, "No other frames were held out, so nothing was measured."]
+    if divided(run.pictures, map(int, run.held_out)):
+        others = f"{len(frames)} later frames of the same recordings"
+    else:
+        others = f"{len(frames)} frames of other recordings"
+    measured = f"{learned} These scores are of {others}."
+    if not run.split.test:
+        measured += " They chose the best epoch, so the scores after it may be a little too good."
+    return [measured, LOOK_ALONE]
 
 
 def _copy(network: LookNetwork) -> dict[str, torch.Tensor]:

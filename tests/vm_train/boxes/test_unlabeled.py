@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from vm_train.boxes.box import Box, BoxedPicture
-from vm_train.boxes.unlabeled import Sighting, describe, without_box
+from vm_train.boxes.unlabeled import FoundBox, describe, without_box
 
 FOLDER = Path("/frames")
 
@@ -13,7 +13,7 @@ def picture(name, *boxes):
 
 
 def seen(name, probability, left=20.0, kind="ball"):
-    return Sighting(FOLDER / name, Box(kind, left, 30.0, left + 20.0, 50.0), probability)
+    return FoundBox(FOLDER / name, Box(kind, left, 30.0, left + 20.0, 50.0), probability)
 
 
 def test_sightings_without_a_box_of_their_class_are_told_once():

@@ -12,7 +12,7 @@ from tests.vm_train.drawn import CLASSES
 from tests.vm_train.weights import same, weights_of
 from vm_export.canvas_shape import CanvasShape
 from vm_export.checkpoint import Checkpoint
-from vm_train.learning.log import read_log
+from vm_train.runs.log import read_log
 
 OCTAVES = """
 [mesh]

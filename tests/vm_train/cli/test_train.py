@@ -9,6 +9,8 @@ import pytest
 
 from tests.vm_train.commands import COMMAND, environment, run
 from vm_train.cli.train import main
+from vm_train.learning.configuration import TrainConfiguration
+from vm_train.runs.run import write_run
 
 
 @pytest.mark.long
@@ -56,6 +58,9 @@ def test_wrong_options_end_in_one_line(arguments, said, data, configuration, tmp
 
 @pytest.mark.parametrize("arguments", [["data", "-o", "run"], ["rate", "data"], ["resume", "run"]])
 def test_without_torch_it_says_what_to_install(arguments, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "pictures.json").write_text("{}")
+    write_run(tmp_path / "run", "mesh", TrainConfiguration(), (), {})
     program = (
         f"import sys; sys.modules['torch'] = None; from vm_train.cli.train import main; sys.exit(main({arguments}))"
     )
@@ -72,7 +77,7 @@ def test_a_folder_without_pictures_or_a_training_ends_in_one_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", '{"kind": []}', '{"kind": "look"}', '{"kind": "tuning"}', pytest.param("[" * 200_000, id="deep")]
+    "text", ["", "[]", '{"kind": []}', '{"kind": "look"}', '{"kind": "tune"}', pytest.param("[" * 200_000, id="deep")]
 )
 def test_a_damaged_description_of_a_training_ends_in_one_line(text, tmp_path, capsys):
     (tmp_path / "run.json").write_text(text)
@@ -81,7 +86,7 @@ def test_a_damaged_description_of_a_training_ends_in_one_line(text, tmp_path, ca
     assert line.startswith(f"vm-train: {tmp_path / 'run.json'} is damaged: ")
 
 
-@pytest.mark.parametrize("kind", [None, "look", "tuning"])
+@pytest.mark.parametrize("kind", [None, "look", "tune"])
 def test_a_training_of_another_release_is_refused_in_one_line(kind, tmp_path, capsys):
     (tmp_path / "run.json").write_text(json.dumps({"kind": kind, "format": 0}))
     assert main(["resume", str(tmp_path)]) == 1

@@ -17,8 +17,8 @@ from tests.folders import contents
 from tests.vm_train.commands import COMMAND, environment, run, run_and_stop, wait_for_steps
 from tests.vm_train.weights import same, weights_of
 from vm_export.checkpoint import Checkpoint
-from vm_train.learning.folder_access import locked
-from vm_train.learning.log import read_log
+from vm_train.runs.log import read_log
+from vm_train.runs.run import locked
 
 VALIDATION = "validation_average_precision"
 
@@ -53,8 +53,8 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
     assert [each["epoch"] for each in records if VALIDATION in each] == [1, 2, 3, 1, 2, 3]
     assert "validation AP: average precision of the mesh points of ball" in done.stdout
     shown = re.findall(
-        r"^round (\d) of 2, epoch (\d) of 3: loss (\d\.\d{3}), validation AP (\d\.\d{3})(?: \(the best so far\))?, "
-        r"learning rate ([\d.e-]+), \d+ pictures/s, 0:00:\d\d left$",
+        r"^round (\d) of 2, epoch (\d) of 3: validation AP (\d\.\d{3})(?: \(the best so far\))?, \d+ pictures/s; "
+        r"loss (\d\.\d{3}), learning rate ([\d.e-]+), 0:00:\d\d left$",
         done.stdout,
         re.MULTILINE,
     )
@@ -62,9 +62,9 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
     rates = {(each["round"], each["step"]): each["rate"] for each in steps}
     assert [each[4] for each in shown] == [f"{rates[each['round'], each['step']]:.2g}" for each in scores]
     assert [tuple(map(int, each[:2])) for each in shown] == [(each["round"], each["epoch"]) for each in scores]
-    assert [each[3] for each in shown] == [f"{each[VALIDATION]:.3f}" for each in scores]
+    assert [each[2] for each in shown] == [f"{each[VALIDATION]:.3f}" for each in scores]
     first = [each["loss"] for each in steps[: len(steps) // 6]]
-    assert shown[0][2] == f"{sum(first) / len(first):.3f}"
+    assert shown[0][3] == f"{sum(first) / len(first):.3f}"
     assert len(list((folder / "tensorboard" / "round2").glob("events*"))) == 1
     checkpoint = Checkpoint.load(folder / "model.pt")
     assert checkpoint.manifest.provenance["training_pictures"] == str(count)
@@ -192,7 +192,7 @@ def test_a_configuration_that_was_edited_is_refused(whole, tmp_path):
     folder = copied(whole, tmp_path)
     path = folder / "train.toml"
     path.write_text(path.read_text().replace("epochs = 3", "epochs = 5"))
-    assert "train.toml or pictures.json was changed" in run("resume", folder, code=1).stderr
+    assert "train.toml was changed" in run("resume", folder, code=1).stderr
 
 
 def test_a_training_in_work_is_left_alone(whole, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from tests.vm_train.commands import SMALL, run, run_module
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_export.checkpoint import Checkpoint
-from vm_train.learning.log import read_log
+from vm_train.runs.log import read_log
 
 VALIDATION = "validation_average_precision"
 

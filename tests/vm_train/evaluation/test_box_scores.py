@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_train.boxes.box import Box, BoxedPicture
-from vm_train.boxes.unlabeled import Sighting
+from vm_train.boxes.unlabeled import FoundBox
 from vm_train.evaluation.box_report import box_lines, box_page
 from vm_train.evaluation.box_scores import SIZES, BoxScores, JudgedFrame
 
@@ -23,7 +23,7 @@ def box(x, y, side, name="ball"):
 def frame(boxes, found, image=Path("x.jpg")):
     """A judged frame. found: pairs of a box and its confidence."""
     picture = BoxedPicture(image, SIZE, tuple(boxes), "a")
-    return JudgedFrame.of(picture, "ball", [Sighting(image, each, confidence) for each, confidence in found])
+    return JudgedFrame.of(picture, "ball", [FoundBox(image, each, confidence) for each, confidence in found])
 
 
 def scores(*frames, threshold=0.3):

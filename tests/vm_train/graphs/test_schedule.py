@@ -18,18 +18,18 @@ plans = st.builds(
 
 @given(plans)
 def test_every_epoch_looks_at_every_picture_so_often_and_then_at_all_of_the_validation(plan):
-    _, epochs, batch, training, validation, looks = plan
+    _, epochs, batch, training, validation, repeats = plan
     batches = list(schedule(*plan))
     for epoch in range(epochs):
         own = [each for each in batches if each.epoch == epoch]
         learned = [item.position for each in own if not each.validates for item in each.items]
         checked = [item.position for each in own if each.validates for item in each.items]
-        assert sorted(learned) == [each for each in range(training) for _ in range(looks)]
+        assert sorted(learned) == [each for each in range(training) for _ in range(repeats)]
         assert checked == list(range(training, training + validation))
         assert [each.validates for each in own] == sorted(each.validates for each in own)
         assert sum(each.last for each in own) == 1 + (validation > 0)
     steps = [each.step for each in batches if not each.validates]
-    assert steps == list(range(1, epochs * -(-looks * training // batch) + 1))
+    assert steps == list(range(1, epochs * -(-repeats * training // batch) + 1))
 
 
 @given(plans, st.integers(1, 4))

@@ -6,8 +6,7 @@ from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError
 from vm_export.canvas_shape import CanvasShape
-from vm_train.learning.configuration import TrainConfiguration
-from vm_train.learning.recipe import Recipe
+from vm_train.learning.configuration import Recipe, TrainConfiguration
 
 DEFAULT = TrainConfiguration()
 

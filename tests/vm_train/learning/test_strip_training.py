@@ -11,10 +11,11 @@ from tests.vm_train.learning.test_trainer import weights
 from tests.vm_train.weights import same
 from vm_export.canvas_network import CanvasNetwork
 from vm_export.canvas_shape import CanvasShape
+from vm_export.torch_files import load_values, save_values
 from vm_train.graphs.labeled_graph import CONTEXT, LabeledGraph, empty_graph
 from vm_train.graphs.schedule import Item, schedule
-from vm_train.learning.recipe import Recipe
-from vm_train.learning.trainer import Trainer, read_state
+from vm_train.learning.configuration import Recipe
+from vm_train.learning.trainer import Trainer
 
 COUNT = 4
 RECIPES = {
@@ -53,7 +54,7 @@ def training(recipe, graders=()):
 def run(made, until=None):
     """Losses of the steps that are left, or of those before `until`."""
     batches = batches_of(made.recipe)[made.done : until]
-    return [made.step(each.items, [graph(item.position) for item in each.items]).loss for each in batches]
+    return [made.step(each.items, [graph(item.position) for item in each.items])["loss"] for each in batches]
 
 
 def test_it_learns_what_a_checkpoint_then_knows():
@@ -77,9 +78,9 @@ def test_what_is_interrupted_ends_with_the_same_weights(recipe, stop, tmp_path):
     first = training(recipe)
     before = run(first, until=stop)
     first.probabilities(graph(0))  # a validation, which no training may notice
-    first.save(tmp_path / "state.pt", {})
+    save_values(tmp_path / "state.pt", first.state())
     second = training(recipe)
-    second.load(read_state(tmp_path / "state.pt"))
+    second.load(load_values(tmp_path / "state.pt", "a state"))
     assert before + run(second) == losses
     assert same(weights(second), weights(whole))
 
@@ -97,7 +98,7 @@ def test_a_batch_without_points_changes_nothing():
     made = training(RECIPES["muon"])
     before = weights(made)
     step = made.step(batches_of(made.recipe)[0].items[:1], [NOTHING])
-    assert (step.loss, made.done) == (0.0, 1)
+    assert (step["loss"], made.done) == (0.0, 1)
     assert same(weights(made), before)
 
 
@@ -108,8 +109,8 @@ def test_a_window_of_a_few_points_is_learned_from(shape):
     small = graph(2, *shape)
     small.labels[:] = 1
     step = made.step(batches_of(made.recipe)[0].items[:1], [small])
-    assert step.points == len(small)
-    assert np.isfinite(step.loss)
+    assert step["points"] == len(small)
+    assert np.isfinite(step["loss"])
     assert all(torch.isfinite(each).all() for each in weights(made).values())
 
 
@@ -121,7 +122,7 @@ def test_context_gives_no_gradient_but_is_seen():
     assert not np.array_equal(made.probabilities(shown), made.probabilities(hidden))
     shown.labels[:] = CONTEXT
     before = {name: each for name, each in weights(made).items() if "running" not in name and "batches" not in name}
-    assert made.step(batches_of(made.recipe)[0].items[:1], [shown]).points == 0
+    assert made.step(batches_of(made.recipe)[0].items[:1], [shown])["points"] == 0
     after = weights(made)
     assert same({name: after[name] for name in before}, before)
 

@@ -11,11 +11,13 @@ from tests.vm_train.weights import same
 from vm_embedded.errors import InputError
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape
+from vm_export.torch_files import load_values, save_values
 from vm_train.graphs.labeled_graph import LabeledGraph, empty_graph, join_graphs
 from vm_train.graphs.schedule import schedule
-from vm_train.learning.hardware import process_group
-from vm_train.learning.recipe import Recipe
-from vm_train.learning.trainer import Trainer, read_state
+from vm_train.learning.configuration import Recipe
+from vm_train.learning.trainer import Trainer
+from vm_train.runs.hardware import process_group
+from vm_train.runs.loop import read_state
 
 COUNT = 6
 SHARES = np.array([0.7, 1.0])
@@ -61,7 +63,7 @@ def run(made, until=None, rank=0, size=1):
     losses = []
     for batch in batches_of(made.recipe)[made.done : until]:
         own = batch.part(rank, size)
-        losses.append(made.step(own.items, [graph(each.position) for each in own.items]).loss)
+        losses.append(made.step(own.items, [graph(each.position) for each in own.items])["loss"])
     return losses
 
 
@@ -96,11 +98,9 @@ def test_what_is_interrupted_ends_with_the_same_weights(recipe, stop, tmp_path):
 
     first = training(recipe)
     before = run(first, until=stop)
-    first.save(tmp_path / "state.pt", {"round": 1})
+    save_values(tmp_path / "state.pt", first.state())
     second = training(recipe)
-    state = read_state(tmp_path / "state.pt")
-    assert state["more"] == {"round": 1}
-    second.load(state)
+    second.load(load_values(tmp_path / "state.pt", "a state"))
     assert before + run(second) == losses
     assert same(weights(second), weights(whole))
 
@@ -126,7 +126,7 @@ def test_a_batch_without_points_changes_no_weights():
     made = training()
     before = weights(made)
     step = made.step(batches_of(made.recipe)[0].items[:1], [empty_graph(ball_manifest())])
-    assert (step.loss, made.done) == (0.0, 1)
+    assert (step["loss"], made.done) == (0.0, 1)
     assert same(weights(made), before)
 
 
@@ -137,11 +137,10 @@ def test_a_damaged_state_is_refused(content, tmp_path):
         read_state(tmp_path / "state.pt")
 
 
-def test_a_state_of_another_network_is_refused(tmp_path):
-    training().save(tmp_path / "state.pt", {})
+def test_a_state_of_another_network_is_refused():
     other = Trainer(Network(NetworkShape.uniform(depth=2, width=4, classes=2)), Recipe(), 5, SHARES, WEIGHTS)
     with pytest.raises(InputError, match="another training"):
-        other.load(read_state(tmp_path / "state.pt"))
+        other.load(training().state())
 
 
 def _part(rank, size, folder, hard):

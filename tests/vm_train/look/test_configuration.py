@@ -10,8 +10,9 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_train.evaluation.answers import load_subject
-from vm_train.look.configuration import LOOK_HEADER, LookConfiguration, LookRecipe
-from vm_train.look.judged import judged_class
+from vm_train.look.configuration import LookConfiguration, LookRecipe
+from vm_train.look.fitting import class_to_judge
+from vm_train.runs.configuration import header
 
 
 def read(*entries):
@@ -20,7 +21,7 @@ def read(*entries):
 
 def test_the_printed_file_is_the_default_configuration(tmp_path):
     path = tmp_path / "look.toml"
-    path.write_text(to_commented_toml(LookConfiguration(), LOOK_HEADER))
+    path.write_text(to_commented_toml(LookConfiguration(), header("look")))
     assert read_sections(LookConfiguration, path) == LookConfiguration()
     lines = path.read_text().splitlines()
     assert all(before.startswith("#") for before, line in pairwise(lines) if " = " in line and "kind" not in line)
@@ -57,7 +58,7 @@ def test_uprights_need_the_classes_that_tell_where_they_stand():
     )
     configuration = read("patches.object_class=robot", *masks)
     with pytest.raises(InputError, match=r"the truth about a robot needs the classes goal, line"):
-        judged_class(configuration, subject, "soccer")
+        class_to_judge(configuration, subject, "soccer")
 
 
 @pytest.mark.parametrize(("epochs", "rounds"), [(12, 3), (7, 3), (5, 5), (4, 1), (1, 3)])

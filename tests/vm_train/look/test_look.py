@@ -18,8 +18,8 @@ from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.cli.train import main
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split, read_split, write_split
-from vm_train.learning.folder_access import locked
-from vm_train.learning.log import read_log
+from vm_train.runs.log import read_log
+from vm_train.runs.run import locked
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     assert (contract.extent, contract.max_proposals, contract.passes) == (1.75, 10, 1)
     assert made.examples.shape == (4, 16, 16, 3)
     assert contract.provenance["data"] == drawn.name
-    assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["mesh_sha256"]
+    assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["made_from"]["mesh.onnx"]
     for layer in (*made.network.typed_convolutions, made.network.hidden):
         kernel = layer.weight.detach().numpy()
         assert np.array_equal(kernel, rounded(kernel))
@@ -241,7 +241,7 @@ def test_masks_of_other_colors_end_with_advice(look, tmp_path):
 
 
 def test_its_configuration_can_be_written_and_used(look, tmp_path):
-    text = run("look-config").stdout
+    text = run("config", "look").stdout
     assert "[patches]" in text
     (tmp_path / "look.toml").write_text(text.replace("epochs = 12", "epochs = 0"))
     done = look(tmp_path / "run", "--config", tmp_path / "look.toml", code=1)

@@ -7,7 +7,7 @@ import torch
 from tests.vm_train.weights import same
 from vm_embedded.errors import InputError
 from vm_export.look_network import LookNetwork, LookShape
-from vm_train.learning.trainer import read_state
+from vm_export.torch_files import load_values, save_values
 from vm_train.look.configuration import LookRecipe, PatchAugmentation
 from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchSet
@@ -46,7 +46,7 @@ def weights(made):
 def test_it_learns_presence_and_place():
     made = trainer(recipe=LookRecipe(batch=24, rate=0.02), total=150)
     steps = [made.step() for _ in range(150)]
-    assert steps[-1].presence < 0.3 * steps[0].presence
+    assert steps[-1]["presence"] < 0.3 * steps[0]["presence"]
     patches = patch_set()
     found = logits_of(made.network.eval(), patches.patches)
     shown = patches.labels == OBJECT
@@ -66,10 +66,8 @@ def test_what_is_interrupted_ends_with_the_same_weights(graded, stop, tmp_path):
     run(whole, 8)
     first, second = trainer(), trainer()
     run(first, stop)
-    first.save(tmp_path / "state.pt", {"validated": 1})
-    state = read_state(tmp_path / "state.pt")
-    assert state["more"] == {"validated": 1}
-    second.load(state)
+    save_values(tmp_path / "state.pt", first.state())
+    second.load(load_values(tmp_path / "state.pt", "a state"))
     run(second, 8)
     assert same(weights(second), weights(whole))
     assert not same(weights(first), weights(whole))
@@ -113,9 +111,8 @@ def test_a_loss_that_is_no_number_ends_the_training():
         made.step()
 
 
-def test_a_state_of_another_training_is_refused(tmp_path):
+def test_a_state_of_another_training_is_refused():
     made = trainer()
     made.grade()
-    made.save(tmp_path / "state.pt", {})
     with pytest.raises(InputError, match="belongs to another training"):
-        trainer(patch_set(30)).load(read_state(tmp_path / "state.pt"))
+        trainer(patch_set(30)).load(made.state())

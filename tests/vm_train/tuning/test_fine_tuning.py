@@ -1,4 +1,4 @@
-"""vm-train look --boxes as a user types it: real processes that are stopped, killed and resumed."""
+"""vm-train tune as a user types it: real processes that are stopped, killed and resumed."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from vm_embedded.network.model_file import read_model
 from vm_export.look_weights import looks_of
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.train import main
-from vm_train.learning.log import read_log
+from vm_train.runs.log import read_log
 from vm_train.tuning.boxed_objects import split_by_recording
 
 from ..drawn import draw_set
@@ -23,11 +23,11 @@ from ..drawn import draw_set
 
 @pytest.fixture(scope="module")
 def tune(frames, tiny):
-    """Runs vm-train look --boxes with one worker; more arguments override these."""
+    """Runs vm-train tune with one worker; more arguments override these."""
 
-    def run_tuning(output, *arguments, **options):
+    def run_tuning(output, *arguments, boxes=frames, **options):
         given = ["--from", "ball", "--names", "0=ball", "--config", tiny, "--workers", 1, *arguments]
-        return run("look", "--boxes", frames, "-o", output, *given, **options)
+        return run("tune", boxes, "-o", output, *given, **options)
 
     return run_tuning
 
@@ -46,8 +46,9 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
     assert re.fullmatch(r"\d+ patches of your frames, \d+ of them show the object", lines[1])
     for epoch in (1, 2):
         assert re.fullmatch(
-            rf"epoch {epoch} of 2: validation loss [\d.]+ for your frames, [\d.]+ for rendered patches, "
-            r"with \d+0% of the new weights; loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
+            rf"epoch {epoch} of 2: validation loss [\d.]+ for your frames, [\d.]+ for rendered patches"
+            r"( \(the best so far\))?, with \d+0% of the new weights; "
+            r"loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
             lines[1 + epoch],
         )
     assert re.search(r"model.onnx: in 4 frames for the test, it finds \d+ of \d+ boxes and \d+ false", lines[4])
@@ -61,7 +62,7 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
     assert "with fewer than 25 frames for training" in done.stderr
     assert {path.name for path in folder.iterdir()} == {
         *("tune.toml", "run.json", "before.onnx", "rendered.npz", "patches", "look.pt", "log.jsonl", "tensorboard"),
-        *("model.onnx", "report.html", "result.json", "pictures.json"),
+        *("state.pt", "model.onnx", "report.html", "result.json", "pictures.json"),
     }
     result = json.loads((folder / "result.json").read_text())
     assert result["before"]["all"]["boxes"] == result["after"]["all"]["boxes"] > 0
@@ -92,9 +93,9 @@ def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_b
     lens = draw_set(tmp_path / "drawn", 1) / "lens0000.yaml"
     for image in seen.glob("*.jpg"):
         shutil.copy(lens, image.with_suffix(".yaml"))
-    done = tune(tmp_path / "run", "--boxes", seen, "--set", "data.validation=0", "--set", "data.test=0")
+    done = tune(tmp_path / "run", "--set", "data.validation=0", "--set", "data.test=0", boxes=seen)
     lines = done.stdout.splitlines()
-    assert re.match(r"epoch 1 of 2: validation loss [\d.]+ for rendered patches, with ", lines[2])
+    assert re.match(r"epoch 1 of 2: validation loss [\d.]+ for rendered patches \(the best so far\), with ", lines[2])
     model = tmp_path / "run" / "model.onnx"
     assert lines[4:] == [
         f"{model}: not measured, because no frames were held out",
@@ -134,7 +135,7 @@ def assert_same(folder, expected):
 def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, wait, whole, frames, tiny, tmp_path):
     folder = tmp_path / "run"
     given = ["--from", "ball", "--names", "0=ball", "--config", tiny, "--workers", 1]
-    run_and_stop(how, folder, wait, 0, "look", "--boxes", frames, *given)
+    run_and_stop(how, folder, wait, 0, "tune", frames, *given)
     run("resume", folder, "--workers", 2)
     assert_same(folder, whole[0])
 
@@ -159,10 +160,10 @@ def test_changed_boxes_or_settings_are_refused(whole, frames, tmp_path):
 
 @pytest.fixture
 def complaint(frames, tmp_path, capsys):
-    """What vm-train look --boxes says about arguments that it can't use: one line."""
+    """What vm-train tune says about arguments that it can't use: one line."""
 
     def complain(*arguments):
-        assert main(["look", "-o", str(tmp_path / "run"), *map(str, arguments)]) == 1
+        assert main(["tune", "-o", str(tmp_path / "run"), *map(str, arguments)]) == 1
         error = capsys.readouterr().err
         assert error.count("\n") == 1
         return error
@@ -171,14 +172,10 @@ def complaint(frames, tmp_path, capsys):
 
 
 def test_mistakes_are_told_in_one_line(complaint, frames, tmp_path):
-    ball, boxes = ["--from", "ball"], ["--boxes", frames]
-    assert "give a folder of rendered pictures, DATA, or" in complaint(*ball)
-    assert "has no box of class ball" in complaint(*ball, *boxes)
-    assert "--names 0=ball" in complaint(*ball, *boxes)
-    assert "leave out DATA" in complaint(frames, *ball, *boxes)
-    assert "leave out --start" in complaint(*ball, *boxes, "--start", "x.pt")
-    assert "go with --boxes" in complaint(frames, *ball, "--names", "0=ball")
-    assert "patience" in complaint(*ball, *boxes, "--names", "0=ball", "--set", "training.patiense=3")
+    ball = ["--from", "ball", frames]
+    assert "has no box of class ball" in complaint(*ball)
+    assert "--names 0=ball" in complaint(*ball)
+    assert "patience" in complaint(*ball, "--names", "0=ball", "--set", "training.patiense=3")
     assert not (tmp_path / "run").exists()
 
 
@@ -192,27 +189,25 @@ def test_boxes_that_are_only_in_the_test_leave_nothing(complaint, frames, tmp_pa
     splits = {seed: split_by_recording(pictures, 0.3, 0.3, seed).test for seed in range(99)}
     seed = next(seed for seed, taken in splits.items() if pictures[int(taken[0])].image.name[0] == "b")
     options = ("--names", "0=ball", "--set", f"data.split_seed={seed}", "--set", "data.test=0.3")
-    assert "part for training, has no box" in complaint("--from", "ball", "--boxes", folder, *options)
+    assert "part for training, has no box" in complaint(folder, "--from", "ball", *options)
     assert not (tmp_path / "run").exists()
 
 
 def test_strict_refuses_faults_before_it_writes_anything(frames, tmp_path, tune):
     damaged = shutil.copytree(frames, tmp_path / "damaged")
     next(path for path in sorted(damaged.glob("*.txt")) if path.read_text()).write_text("0 0.5\n")
-    error = tune(tmp_path / "run", "--boxes", damaged, "--strict", code=1).stderr
+    error = tune(tmp_path / "run", "--strict", boxes=damaged, code=1).stderr
     assert "has 2 values" in error
     assert "leave out --strict" in error
     assert not (tmp_path / "run").exists()
 
 
 def test_a_class_without_rendered_patches_needs_a_run(whole, tmp_path, complaint, frames):
-    assert "holds no training" in complaint(
-        "--from", "ball", "--boxes", frames, "--names", "0=ball", "--rendered", tmp_path
-    )
+    assert "holds no training" in complaint(frames, "--from", "ball", "--names", "0=ball", "--rendered", tmp_path)
 
 
 def test_tune_config_prints_what_config_reads(tmp_path, tune):
-    text = run("tune-config").stdout
+    text = run("config", "tune").stdout
     assert "[training]" in text
     path = tmp_path / "tune.toml"
     path.write_text(text.replace("epochs = 8", "epochs = 0"))

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from vm_embedded.arrays import Mask
-from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.errors import InputError
 from vm_workstation.text_tables import shortened
 
+from ..runs.loop import shown
 from .collection import collect_patches
 from .patch_set import PatchChunk, PatchSet
-from .run_folder import LookRun
+from .run import LookRun
 
 _NAMED = 20
 """Pictures that can't be used, to name."""
 
 
 @dataclass(frozen=True)
-class Collected:
+class TrainingPatches:
     """The patches of a run: for training, and proposals for validation. objects: in validation pictures; proposed: of
     these, those that some proposal is at."""
 
@@ -38,16 +38,13 @@ class Collected:
         return len(np.unique(self.training.pictures))
 
 
-def collect(run: LookRun, workers: int) -> Collected:
+def collect(run: LookRun, workers: int, stopped: Callable[[], bool]) -> TrainingPatches:
     """Collect the patches of a run, or read those that are collected, and name the pictures that can't be used.
 
-    Raises InputError and VisualMeshError.
+    stopped: whether to stop, which raises KeyboardInterrupt. Raises InputError and VisualMeshError.
     """
-    bar = ProgressBar(len(run.numbers), "vm-train")
-    try:
-        paths = collect_patches(run, workers, bar.show)
-    finally:
-        bar.clear()
+    with shown(len(run.numbers), stopped) as report:
+        paths = collect_patches(run, workers, report)
     # The patches may fill a large part of the memory: the first pass counts them, the second one keeps them.
     counts = {False: 0, True: 0}
     objects = proposed = 0
@@ -66,7 +63,7 @@ def collect(run: LookRun, workers: int) -> Collected:
             ends[part] = sets[part].write(ends[part], chunk.patches.part(validates == part))
     _check(run, sets[False], "training")
     _check(run, sets[True], "validation")
-    return Collected(sets[False], sets[True], objects, proposed)
+    return TrainingPatches(sets[False], sets[True], objects, proposed)
 
 
 def _chunks(run: LookRun, paths: Sequence[Path]) -> Iterator[tuple[Mask, PatchChunk]]:

@@ -13,20 +13,24 @@ from typing import Any
 import torch
 from torch import nn
 
-from .recipe import Recipe
-
 _MOMENTUM = 0.9  # of sgd
 
 
 class ScheduledOptimizer:
-    """The optimizers of a network's weights, and their schedule of `total` steps."""
+    """The optimizers of a network's weights, and their schedule of `total` steps.
 
-    def __init__(self, network: nn.Module, recipe: Recipe, total: int) -> None:
-        self._optimizers = _optimizers(network, recipe)
+    kind, schedule: one of OPTIMIZERS and of SCHEDULES in configuration.py. rate: the highest learning rate. decay: of
+    the weights.
+    """
+
+    def __init__(
+        self, network: nn.Module, kind: str, rate: float, decay: float, total: int, schedule: str = "one_cycle"
+    ) -> None:
+        self._optimizers = _optimizers(network, kind, rate, decay)
         self._schedules: list[torch.optim.lr_scheduler.LRScheduler] = []
-        if recipe.schedule == "one_cycle":
+        if schedule == "one_cycle":
             self._schedules = [
-                torch.optim.lr_scheduler.OneCycleLR(each, recipe.rate, total_steps=total) for each in self._optimizers
+                torch.optim.lr_scheduler.OneCycleLR(each, rate, total_steps=total) for each in self._optimizers
             ]
 
     @property
@@ -87,14 +91,14 @@ class _Muon(torch.optim.Muon):
         return super().step(closure)  # type: ignore[no-untyped-call]
 
 
-def _optimizers(network: nn.Module, recipe: Recipe) -> list[torch.optim.Optimizer]:
-    weights, rate, decay = list(network.parameters()), recipe.rate, recipe.decay
-    if recipe.optimizer == "muon":
+def _optimizers(network: nn.Module, kind: str, rate: float, decay: float) -> list[torch.optim.Optimizer]:
+    weights = list(network.parameters())
+    if kind == "muon":
         biases = [each for each in weights if each.ndim < 2]
         muon = _Muon([each for each in weights if each.ndim >= 2], rate, decay)
         return [muon, torch.optim.AdamW(biases, lr=rate, weight_decay=decay)]
-    if recipe.optimizer == "sgd":
+    if kind == "sgd":
         return [torch.optim.SGD(weights, lr=rate, momentum=_MOMENTUM, weight_decay=decay)]
-    if recipe.optimizer == "adam":
+    if kind == "adam":
         return [torch.optim.Adam(weights, lr=rate, weight_decay=decay)]
     return [torch.optim.AdamW(weights, lr=rate, weight_decay=decay)]

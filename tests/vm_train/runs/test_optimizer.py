@@ -4,8 +4,8 @@ import pytest
 import torch
 from torch import nn
 
-from vm_train.learning.optimizer import ScheduledOptimizer
-from vm_train.learning.recipe import OPTIMIZERS, Recipe
+from vm_train.runs.configuration import OPTIMIZERS
+from vm_train.runs.optimizer import ScheduledOptimizer
 
 RATE = 0.02
 
@@ -18,7 +18,7 @@ def layer(seed=1):
 
 
 def descent(made, optimizer, schedule="constant"):
-    return ScheduledOptimizer(made, Recipe(optimizer=optimizer, rate=RATE, schedule=schedule, decay=0.0), total=10)
+    return ScheduledOptimizer(made, optimizer, RATE, 0.0, 10, schedule)
 
 
 @pytest.mark.parametrize("optimizer", OPTIMIZERS)

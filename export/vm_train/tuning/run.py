@@ -1,24 +1,19 @@
-"""The folder of a fine-tuning: what it was begun with, and what it has produced.
+"""A fine-tuning of a close look, and the files of its folder.
 
 tune.toml: the configuration. run.json: where the boxes are. before.onnx: the model file that it began with.
-rendered.npz: rendered patches. patches/: patches of the user's frames. look.pt: the network, when it is trained.
-state.pt: the state to resume from. log.jsonl, tensorboard/: the record of each step. model.onnx: the new model file.
-pictures.json: the frames of each part. report.html, result.json: what both networks find in the held-out frames.
+rendered.npz: rendered patches. pictures.json: the frames of each part. patches/: patches of the user's frames.
+look.pt: the network, when it is trained. state.pt: the state to resume from. log.jsonl, tensorboard/: the record of
+each step. model.onnx: the new model file. report.html, result.json: what both networks find in the held-out frames.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from vm_embedded import __version__
 from vm_embedded.arrays import Floats
 from vm_embedded.config.sections import read_sections
-from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.errors import InputError, ModelError
 from vm_embedded.files import write_file
 from vm_embedded.network.model_file import ModelFile, read_model
@@ -29,32 +24,17 @@ from vm_export.look_weights import looks_of
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
 from ..data.split import Split, write_split
-from ..learning.folder_access import check_unused, description
+from ..runs.run import Run, check_unused, description, write_run
 from .boxed_objects import all_objects, boxes_sha256, check_boxes, is_round, split_by_recording
 from .candidates import search_radii
 from .configuration import TuningConfiguration
 from .rendered_sample import check_rendered, write_rendered_for
 
-KIND = "tuning"
-
-REPORT = "report.html"
-"""Name of the report, the last file that a fine-tuning writes."""
-
-_FORMAT = 3
 _FILES = (
-    "tune.toml",
-    "before.onnx",
-    "rendered.npz",
-    "patches",
-    "state.pt",
-    "log.jsonl",
-    "look.pt",
-    "model.onnx",
-    REPORT,
+    *("tune.toml", "before.onnx", "rendered.npz", "patches", "look.pt", "model.onnx", "report.html"),
     "result.json",
-    "pictures.json",
 )
-"""Files that a new fine-tuning would overwrite."""
+"""Files that a new fine-tuning would overwrite, besides those of all trainings."""
 
 
 @dataclass(frozen=True)
@@ -71,27 +51,19 @@ class BoxSource:
 
 
 @dataclass(frozen=True)
-class TuningRun:
+class TuningRun(Run):
     """A fine-tuning as its folder describes it; `begin_tuning` and `read_tuning` make it.
 
-    boxes: where the frames are. model: the network as the user named it. before: its model file. pictures: the frames
-    with their boxes. split: positions of the frames in `pictures`, as text. threads: number of computing threads; a
-    resumed training takes the same.
+    split: positions of the frames in `pictures`, as text. boxes: where the frames are. configuration: its settings.
+    model: the network as the user named it. before: its model file. pictures: the frames with their boxes.
     """
 
-    folder: Path
+    split: Split
     boxes: BoxSource
+    configuration: TuningConfiguration
     model: str
     before: ModelFile
     pictures: tuple[BoxedPicture, ...]
-    split: Split
-    configuration: TuningConfiguration
-    threads: int
-
-    @property
-    def state_path(self) -> Path:
-        """File of the state to resume from."""
-        return self.folder / "state.pt"
 
     @property
     def rendered_path(self) -> Path:
@@ -109,7 +81,7 @@ class TuningRun:
         return self.split.test or self.split.validation
 
     @property
-    def model_path(self) -> Path:
+    def result_path(self) -> Path:
         """The new model file."""
         return self.folder / "model.onnx"
 
@@ -166,66 +138,54 @@ def begin_tuning(
     """
     check_unused(folder, _FILES)
     before = read_model(model)
-    look = tuned_look(before)
+    look, pictures = tuned_look(before), found.pictures
     check_boxes(found, look.contract.object_class, str(boxes.folder))
     check_rendered(look.contract, rendered)
-    split = _split(found.pictures, configuration)
-    run = TuningRun(folder, boxes, name, before, found.pictures, split, configuration, threads)
-    for_training = BoxedSet(tuple(run.part(split.training)), (), ())
+    run = TuningRun(folder, {}, threads, _split(pictures, configuration), boxes, configuration, name, before, pictures)
+    for_training = BoxedSet(tuple(run.part(run.split.training)), (), ())
     check_boxes(for_training, look.contract.object_class, f"{boxes.folder}, part for training,")
     make_folder(folder / "patches")
     write_file(folder / "before.onnx", before.content)
     write_rendered_for(run.rendered_path, rendered)
-    names = [each.image.relative_to(boxes.folder).as_posix() for each in found.pictures]
-    parts = (tuple(names[int(each)] for each in part) for part in (split.training, split.validation, split.test))
+    names = [each.image.relative_to(boxes.folder).as_posix() for each in pictures]
+    parts = (tuple(names[int(each)] for each in part) for part in vars(run.split).values())
     write_split(run.split_path, Split(*parts))
-    write_file(folder / "tune.toml", to_commented_toml(configuration))
-    write_file(folder / "run.json", json.dumps(_description(run), indent=1) + "\n")
-    return run
+    entries = {
+        "boxes": str(boxes.folder),
+        "format_of_boxes": boxes.format,
+        "names": dict(boxes.names),
+        "model": name,
+        "threads": threads,
+        "boxes_sha256": boxes_sha256(pictures),
+    }
+    copies = ("before.onnx", "rendered.npz")
+    return replace(run, digests=write_run(folder, "tune", configuration, copies, entries))
 
 
 def read_tuning(folder: Path, moved_to: Path | None = None) -> TuningRun:
     """The fine-tuning of a folder. moved_to: where its boxes are now. Raises InputError or ModelError."""
-    with description(folder, _FORMAT, "fine-tuning") as content:
+    with description(folder) as content:
         box_folder = Path(content["boxes"]) if moved_to is None else moved_to.resolve()
         boxes = BoxSource(box_folder, content["format_of_boxes"], dict(content["names"]))
-        model, threads = str(content["model"]), int(content["threads"])
-        digests = str(content["boxes_sha256"]), str(content["configuration_sha256"]), str(content["before_sha256"])
-    configuration = read_sections(TuningConfiguration, folder / "tune.toml")
-    pictures = boxes.read().pictures
-    split = _split(pictures, configuration)
-    before = read_model(folder / "before.onnx")
-    run = TuningRun(folder, boxes, model, before, pictures, split, configuration, threads)
-    present = boxes_sha256(pictures), _configuration_sha256(configuration), before.sha256
-    for what, now, then in zip((str(boxes.folder), "tune.toml", "before.onnx"), present, digests, strict=True):
-        if now != then:
+        configuration, pictures = read_sections(TuningConfiguration, folder / "tune.toml"), boxes.read().pictures
+        if boxes_sha256(pictures) != content["boxes_sha256"]:
             raise InputError(
-                f"{what} was changed since the fine-tuning began: undo the change, or begin another one in a new folder"
+                f"{boxes.folder} was changed since the training began: undo the change, or begin another training in "
+                "a new folder"
             )
-    return run
+        return TuningRun(
+            folder=folder,
+            digests=dict(content["made_from"]),
+            split=_split(pictures, configuration),
+            threads=int(content["threads"]),
+            boxes=boxes,
+            configuration=configuration,
+            model=str(content["model"]),
+            before=read_model(folder / "before.onnx"),
+            pictures=pictures,
+        )
 
 
 def _split(pictures: Sequence[BoxedPicture], configuration: TuningConfiguration) -> Split:
     data = configuration.data
     return split_by_recording(pictures, data.validation, data.test, data.split_seed)
-
-
-def _description(run: TuningRun) -> dict[str, Any]:
-    """The content of run.json."""
-    return {
-        "kind": KIND,
-        "format": _FORMAT,
-        "version": __version__,
-        "boxes": str(run.boxes.folder),
-        "format_of_boxes": run.boxes.format,
-        "names": dict(run.boxes.names),
-        "model": run.model,
-        "threads": run.threads,
-        "boxes_sha256": boxes_sha256(run.pictures),
-        "configuration_sha256": _configuration_sha256(run.configuration),
-        "before_sha256": run.before.sha256,
-    }
-
-
-def _configuration_sha256(configuration: TuningConfiguration) -> str:
-    return hashlib.sha256(json.dumps(asdict(configuration)).encode()).hexdigest()

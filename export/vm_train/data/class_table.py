@@ -15,7 +15,7 @@ from vm_embedded.files import read_text
 from vm_embedded.network.manifest import KINDS, ObjectClass
 from vm_synth.dataset.files import CLASS_COLORS
 
-from ..data.classes import Classes, Color
+from .classes import Classes, Color
 
 _KIND_OF = {"ball": "object", "goal": "upright", "robot": "upright", "environment": "background"}
 """Kinds of vm-synth's classes; all others are areas."""

@@ -24,7 +24,7 @@ def load_mesh(path: Path) -> ExactSubject:
     return subject
 
 
-def judged_class(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
+def class_to_judge(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
     """The class that the look network judges. Raises InputError if model or masks do not have it."""
     kinds = {each.name: each.kind for each in subject.manifest.classes if each.name in subject.manifest.peaks}
     name = configuration.patches.object_class or min(kinds, key=lambda each: kinds[each] != "object")

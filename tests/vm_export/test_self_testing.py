@@ -13,7 +13,7 @@ from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import Session
 from vm_export import export
 from vm_export.network_weights import network_of
-from vm_export.strong_self_test import strong_self_test
+from vm_export.self_testing import strong_self_test
 
 pytest.importorskip("onnxruntime")
 

@@ -52,6 +52,15 @@ class Hardware:
         return box
 
 
+def sum_over_processes(value: torch.Tensor) -> torch.Tensor:
+    """The sum of all processes' values, on the CPU; every process gets it."""
+    if not distributed.is_initialized():
+        return value
+    total = value.to("cuda" if distributed.get_backend() == "nccl" else "cpu")  # nccl sends tensors of GPUs only
+    distributed.all_reduce(total)
+    return total.cpu()
+
+
 def check_device(device: str) -> None:
     """Check the device of an option: auto, cpu or cuda. Raises InputError for cuda without a GPU."""
     if device == "cuda" and not torch.cuda.is_available():

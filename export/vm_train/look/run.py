@@ -1,0 +1,138 @@
+"""The training of a close look, and the files of its folder.
+
+look.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are. mesh.onnx or
+mesh.pt: a copy of the mesh network. start.pt: a copy of the look
+network that the training begins with, if there is one. patches/: the patches, in chunks. state.pt: the state to resume
+from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json: what it finds in the
+validation pictures, and how often its probabilities are right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from vm_embedded.config.sections import read_sections
+from vm_embedded.files import read_bytes, write_file
+from vm_embedded.output.result_files import make_folder
+from vm_export.look_checkpoint import LookCheckpoint
+
+from ..data.split import Split, read_split, write_split
+from ..evaluation.answers import ExactSubject
+from ..runs.run import Run, check_unused, description, write_run
+from .configuration import LookConfiguration
+from .fitting import class_to_judge, load_mesh, upright_radius_of
+
+_START = "start.pt"
+_FILES = ("look.toml", "mesh.onnx", "mesh.pt", _START, "patches", "look.pt", "result.json")
+"""Files that a new training would overwrite, besides those of all trainings."""
+
+
+@dataclass(frozen=True)
+class LookRun(Run):
+    """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
+
+    split: numbers of the pictures of each part. data: folder of the pictures. mesh: the copy of the mesh network.
+    model: that network as the user named it. object_class: class to judge. strict: whether a picture that can't be used
+    ends the training.
+    """
+
+    split: Split
+    data: Path
+    configuration: LookConfiguration
+    mesh: Path
+    model: str
+    object_class: str
+    strict: bool
+
+    @property
+    def result_path(self) -> Path:
+        """File of the trained network."""
+        return self.folder / "look.pt"
+
+    @property
+    def patches(self) -> Path:
+        """Folder of the patches."""
+        return self.folder / "patches"
+
+    @property
+    def numbers(self) -> list[str]:
+        """Numbers of all pictures, in order."""
+        return sorted([*self.split.training, *self.split.validation])
+
+    def subject(self) -> ExactSubject:
+        """The mesh network. Raises InputError or ModelError."""
+        return load_mesh(self.mesh)
+
+    def start(self) -> LookCheckpoint | None:
+        """The look network to begin with, if there is one. Raises InputError or ModelError."""
+        return LookCheckpoint.load(self.folder / _START) if _START in self.digests else None
+
+    def provenance(self) -> dict[str, str]:
+        """What a network of this training was made from, for its contract."""
+        start = {"start_sha256": self.digests[_START]} if _START in self.digests else {}
+        made_from = {"mesh_sha256": self.digests[self.mesh.name], "configuration_sha256": self.digests["look.toml"]}
+        return made_from | start
+
+    @property
+    def upright_radius(self) -> float:
+        """Radius of the circles around bases [m]; 0 for a class of kind object."""
+        return upright_radius_of(self.configuration, self.object_class)
+
+
+def begin_look_run(
+    folder: Path,
+    data: Path,
+    split: Split,
+    configuration: LookConfiguration,
+    model: Path,
+    name: str,
+    *,
+    strict: bool = False,
+    threads: int = 1,
+    start: LookCheckpoint | None = None,
+) -> LookRun:
+    """Write the files of a new training. model: file of the mesh network; name: as the user named it. start: network
+    to begin with, which fits the configuration.
+
+    Raises InputError, also if the folder holds a training, and ModelError.
+    """
+    check_unused(folder, _FILES)
+    _ = configuration.shape
+    object_class = class_to_judge(configuration, load_mesh(model), name)
+    make_folder(folder / "patches")
+    write_split(folder / "pictures.json", split)
+    mesh = f"mesh{model.suffix.lower()}"
+    write_file(folder / mesh, read_bytes(model))
+    if start is not None:
+        start.save(folder / _START)
+    entries = {
+        "data": str(data.resolve()),
+        "mesh": mesh,
+        "model": name,
+        "object_class": object_class,
+        "strict": strict,
+        "threads": threads,
+    }
+    write_run(folder, "look", configuration, (mesh, *([_START] if start else ())), entries)
+    return read_look_run(folder)
+
+
+def read_look_run(folder: Path, moved_to: Path | None = None) -> LookRun:
+    """Read a training that was begun. moved_to: where its pictures are now.
+
+    Raises InputError, also if its files were changed since.
+    """
+    with description(folder) as content:
+        return LookRun(
+            folder=folder,
+            digests=dict(content["made_from"]),
+            split=read_split(folder / "pictures.json"),
+            threads=int(content["threads"]),
+            data=Path(content["data"]) if moved_to is None else moved_to.resolve(),
+            configuration=read_sections(LookConfiguration, folder / "look.toml"),
+            mesh=folder / str(content["mesh"]),
+            model=str(content["model"]),
+            object_class=str(content["object_class"]),
+            strict=bool(content["strict"]),
+        )

@@ -1,0 +1,1 @@
+"""What all trainings share: the folder of a run, the loop of its epochs, the optimizer, the log and the hardware."""
