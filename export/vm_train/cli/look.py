@@ -20,8 +20,6 @@ from .options import SET_EXAMPLE, add_configuration, add_data, add_hardware, add
 from .training import run_training
 
 if TYPE_CHECKING:
-    from vm_export.look_checkpoint import LookCheckpoint
-
     from ..look.training import LookTraining
     from ..runs.hardware import Hardware
 
@@ -44,13 +42,6 @@ def look_parser() -> argparse.ArgumentParser:
         help="mesh network whose peaks it judges: a checkpoint (.pt), a model file (.onnx), or a network of the "
         f"package ({', '.join(SHIPPED)})",
     )
-    made.add_argument(
-        "--start",
-        metavar="LOOK",
-        help="begin with the weights of a trained close look, not with random ones: a look.pt, a model file (.onnx), "
-        f"or a network of the package ({', '.join(SHIPPED)}). Its patches and layers, and training.rate 0.005 "
-        "become the defaults",
-    )
     add_output(made)
     add_configuration(made, "look")
     made.add_argument("--strict", action="store_true", help="fail if a picture is damaged; default: skip it")
@@ -62,9 +53,9 @@ def run_look(options: argparse.Namespace) -> int:
     """Begin the training of a close look, train, and return the exit status. Raises VisualMeshError."""
     from ..look.run import begin_look_run
 
-    start, configuration = _start_and_configuration(options)
     model = model_path(options.model)
-    configuration = _with_classes_of(model, configuration)
+    given = read_sections(LookConfiguration, options.config, parse_overrides(options.set, SET_EXAMPLE))
+    configuration = _with_classes_of(model, given)
 
     def begin(hardware: Hardware) -> None:
         numbers, data = [each.number for each in find_pictures(options.data)], configuration.data
@@ -79,27 +70,12 @@ def run_look(options: argparse.Namespace) -> int:
             str(options.model),
             strict=options.strict,
             threads=options.threads or 1,
-            start=start,
         )
         count = [len(each) for each in asdict(split).values()]
         parts = f"{count[0]} for training, {count[1]} for validation, {count[2]} for test"
         print(f"{options.data}: {sum(count)} pictures: {parts}", flush=True)
 
     return run_training(options, options.output, partial(_load, options.output, None), _report, begin, alone=True)
-
-
-def _start_and_configuration(options: argparse.Namespace) -> tuple[LookCheckpoint | None, LookConfiguration]:
-    """The network of --start, and the configuration, whose defaults it changes. Raises InputError or ModelError."""
-    from ..look.start import LookStart
-
-    overrides = parse_overrides(options.set, SET_EXAMPLE)
-    configuration = read_sections(LookConfiguration, options.config, overrides)  # tells the class to judge
-    if options.start is None:
-        return None, configuration
-    start = LookStart.load(model_path(options.start), configuration.patches.object_class)
-    configuration = read_sections(LookConfiguration, options.config, overrides, defaults=start.defaults)
-    start.check(configuration)
-    return start.look, configuration
 
 
 def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfiguration:

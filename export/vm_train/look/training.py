@@ -90,15 +90,11 @@ class LookTraining(Training):
         print(f"{run.result_path}: {result}")
 
     def _prepare(self) -> None:
-        """Make the network, from random weights or from those of a trained one."""
+        """Make the network."""
         configuration, recipe = self.run.configuration, self.run.configuration.training
         self.steps = -(-len(self._patches.training) // recipe.batch)
         torch.manual_seed(recipe.seed)
         network = LookNetwork(configuration.shape)
-        start = self.run.start()
-        if start is not None:
-            network.load_state_dict(start.network.state_dict())
-            network.calibration.copy_(torch.tensor([1.0, 0.0]))  # the end of the training sets it again
         extent, augmentation = configuration.patches.extent, configuration.augmentation
         total, device = recipe.epochs * self.steps, self._hardware.device
         self.learner = LookTrainer(network, self._patches.training, extent, recipe, augmentation, total, device=device)
@@ -146,7 +142,8 @@ class LookTraining(Training):
             "validation_pictures": str(len(run.split.validation)),
             "validation_proposals": str(len(found.validation)),
             "patches_sha256": found.training.sha256(),
-            **run.provenance(),
+            "mesh_sha256": run.digests[run.mesh.name],
+            "configuration_sha256": run.digests["look.toml"],
             "epochs": str(recipe.epochs),
             "rounds": str(recipe.rounds),
             "seed": str(recipe.seed),
