@@ -229,8 +229,9 @@ balls of 0.05 to 0.12 m radius:
 
 With the default settings there are {number(scores["all"]["false_per_picture"], 3)} false balls per picture, and the
 median distance error of balls from 0.5 to 6 m is {number(used["distance_error"], 1, 100.0)} %. Of the balls with a
-radius of at least 2 px that are at least a quarter visible, {number(scores["proposals"]["recall_0.5"], 1, 100.0)} % have a
-proposal within half a radius; there are {scores["proposals"]["mean_count"]:.0f} proposals per picture on average.
+radius of at least 2 px that are at least a quarter visible,
+{number(scores["proposals"]["recall_0.5"], 1, 100.0)} % have a proposal within half a radius; there are
+{scores["proposals"]["mean_count"]:.0f} proposals per picture on average.
 On {clutter["pictures"]} pictures full of things that look like balls, AP50 from 0.5 to 6 m is
 {number(hard["average_precision"], 3)}, with {number(clutter["all"]["false_per_picture"], 3)} false balls per picture.
 docs/results.md has more figures.

@@ -74,18 +74,14 @@ def run_calibrate(options: argparse.Namespace) -> int:
     looks, scores = [], {}
     for name in model.manifest.peaks:
         precisions = [_ranking(result, name).precision_recall.average_precision for _, result in tries]
-        best = precisions.index(max(precisions))
-        look, result = tries[best][0].get(name), tries[best][1]
-        if look is not None:
+        by_class, result = tries[precisions.index(max(precisions)) if name in tries[0][0] else 0]
+        fitted, source = _calibration(name, result)
+        if name in by_class:
+            looks.append(by_class[name].recalibrated(fitted.scale, fitted.offset, source))
             for weight, precision in zip(_MESH_WEIGHTS, precisions, strict=True):
                 print(f"{name}: average precision {precision:.4f} with a mesh weight of {weight:g}")
         else:
-            result = tries[0][1]
-        fitted, source = _calibration(name, result)
-        if look is None:
             scores[name] = fitted.scale, fitted.offset
-        else:
-            looks.append(look.recalibrated(fitted.scale, fitted.offset, source))
     lost_canary = change_confidence(path, options.output, looks, scores)
     print(f"{options.output}: written; other objects may now pass --min-confidence")
     if lost_canary:
@@ -110,14 +106,14 @@ def _tries(
 
     found: list[tuple[Mapping[str, LookCheckpoint], Evaluation]] = []
     with tempfile.TemporaryDirectory() as folder:
-        for weight in _MESH_WEIGHTS if looks else ():
+        for weight in _MESH_WEIGHTS if looks else (0.0,):
             weighted = [replace(each, contract=replace(each.contract, mesh_weight=weight)) for each in looks]
             path = Path(folder) / "weighted.onnx"
             change_confidence(job.model, path, weighted, {})
             tried = replace(job, model=path)
             by_class = {each.contract.object_class: each for each in weighted}
             found.append((by_class, evaluate_with_progress(tried, tried.subject(), pictures, workers)))
-    return found or [({}, evaluate_with_progress(job, job.subject(), pictures, workers))]
+    return found
 
 
 def _calibration(name: str, result: Evaluation) -> tuple[Calibration, str]:

@@ -143,9 +143,10 @@ class LookRecipe:
     def __post_init__(self) -> None:
         check_entries(self)
 
-    def round_of(self, epoch: int) -> int:
-        """Round of an epoch; both are counted from 0."""
-        return epoch * min(self.rounds, self.epochs) // self.epochs
+    def begins_round(self, epoch: int) -> bool:
+        """Whether an epoch, counted from 0, begins a round after the first one."""
+        before, now = ((epoch - 1 + each) * min(self.rounds, self.epochs) // self.epochs for each in (0, 1))
+        return epoch > 0 and before < now
 
 
 @dataclass(frozen=True)

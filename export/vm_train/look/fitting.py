@@ -40,9 +40,3 @@ def class_to_judge(configuration: LookConfiguration, subject: ExactSubject, mode
     if name in UPRIGHTS and missing:
         raise InputError(f"the truth about a {name} needs the classes {', '.join(missing)}: add them to [classes]")
     return name
-
-
-def upright_radius_of(configuration: LookConfiguration, object_class: str) -> float:
-    """Radius of the circles around bases [m]; 0 for a class of kind object."""
-    is_upright = configuration.classes.kinds[object_class] == "upright"
-    return configuration.patches.upright_radius if is_upright else 0.0

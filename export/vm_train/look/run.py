@@ -19,7 +19,7 @@ from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject
 from ..runs.run import Run, check_unused, description, write_run
 from .configuration import LookConfiguration
-from .fitting import class_to_judge, load_mesh, upright_radius_of
+from .fitting import class_to_judge, load_mesh
 
 _FILES = ("look.toml", "mesh.onnx", "mesh.pt", "patches", "look.pt", "result.json")
 """Files that a new training would overwrite, besides those of all trainings."""
@@ -64,7 +64,8 @@ class LookRun(Run):
     @property
     def upright_radius(self) -> float:
         """Radius of the circles around bases [m]; 0 for a class of kind object."""
-        return upright_radius_of(self.configuration, self.object_class)
+        is_upright = self.configuration.classes.kinds[self.object_class] == "upright"
+        return self.configuration.patches.upright_radius if is_upright else 0.0
 
 
 def begin_look_run(

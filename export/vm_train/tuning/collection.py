@@ -28,14 +28,6 @@ CHUNK = 20
 """Frames in a file of patches."""
 
 
-@dataclass(frozen=True)
-class Frame:
-    """A boxed frame and its position in the run's list."""
-
-    picture: BoxedPicture
-    position: int
-
-
 @dataclass(frozen=True, eq=False)
 class WindowCollector:
     """Cuts the patches of a frame. look: the network before the fine-tuning. radii (s,): of objects [px]."""
@@ -53,9 +45,9 @@ class WindowCollector:
         look = TorchLook(before.network, before.contract)
         return cls(look, run.configuration.patches, run.radii, run.object_class, run.is_round)
 
-    def __call__(self, frame: Frame) -> PatchChunk:
-        """The patches of a frame. Raises InputError if it can't be read any more."""
-        picture, settings = frame.picture, self.settings
+    def __call__(self, frame: tuple[int, BoxedPicture]) -> PatchChunk:
+        """The patches of a frame, given with its number. Raises InputError if it can't be read any more."""
+        (number, picture), settings = frame, self.settings
         pyramid = Pyramid(read_image(picture.image), "bgr")
         objects = objects_of(picture, self.object_class, self.is_round)
         random = random_of(settings.seed, picture.image.name)
@@ -67,7 +59,7 @@ class WindowCollector:
         found = windows.label(objects)
         clear = found.labels != UNLABELED
         patches = windows.part(clear).cut(pyramid, self.look.contract)
-        pictures = np.full(len(patches), frame.position, dtype=np.int32)
+        pictures = np.full(len(patches), number, dtype=np.int32)
         return PatchChunk(PatchSet(patches, found.labels[clear], found.targets[clear], pictures))
 
 
@@ -77,8 +69,7 @@ def collect_windows(run: TuningRun, workers: int, report: Callable[[int], None])
     workers: processes; 1 uses only this process. report: is called with the number of frames that are done. Raises
     InputError, and VisualMeshError if a worker was killed.
     """
-    frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
-    make, folder = partial(WindowCollector.of, run), run.folder / "patches"
+    frames, make, folder = list(enumerate(run.pictures)), partial(WindowCollector.of, run), run.folder / "patches"
     paths = collect_chunks(frames, make, CHUNK, folder, workers, report)
     size = tuned_look(run.before).contract.size
     return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])

@@ -73,12 +73,11 @@ class Tuning(Training):
 
     run: TuningRun
     learner: LookTrainer
-    rounds = 1
 
     def __init__(self, run: TuningRun, hardware: Hardware) -> None:
         self.run, self._workers, recipe = run, hardware.workers, run.configuration.training
         super().__init__()
-        self.epochs, self.steps, self.patience = range(recipe.epochs), recipe.steps, recipe.patience
+        self.epochs, self.steps, self.patience = recipe.epochs, recipe.steps, recipe.patience
 
     def begin(self, progress: Progress, stopped: Callable[[], bool]) -> None:
         """Collect the patches, and prepare the network."""
@@ -110,7 +109,7 @@ class Tuning(Training):
 
     def step(self) -> dict[str, float]:
         """Learn from the next batch."""
-        if self.learner.done in (0, self.epochs.stop // 2 * self.steps):
+        if self.learner.done in (0, self.epochs // 2 * self.steps):
             self.learner.grade()
         return self.learner.step()
 

@@ -61,7 +61,7 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     records = [record for _, record in read_log(folder / "log.jsonl")]
     steps = [each["step"] for each in records if "loss" in each]
     assert steps == list(range(1, len(steps) + 1))
-    assert [(each["round"], each["epoch"]) for each in records if "epoch" in each] == [(1, 1), (1, 2), (2, 3), (2, 4)]
+    assert [(each["round"], each["epoch"]) for each in records if "epoch" in each] == [(1, 1), (1, 2), (1, 3), (1, 4)]
     result = json.loads((folder / "result.json").read_text())
     assert sum(each["count"] for each in result["bins"]) > 0
 
