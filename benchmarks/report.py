@@ -1,4 +1,7 @@
-"""From results.json to the tables and plots of docs/performance.md; the text between the tables stays as it is."""
+"""From results.json to tables and plots of docs/performance.md, experiments/speed.md and the README.
+
+The text between the tables stays as it is.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,7 @@ PEER_TIMES = Path(__file__).with_name("peer_times.json")
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = DOCS / "performance.md"
 EXPERIMENTS = Path(__file__).with_name("experiments")
+SPEED = EXPERIMENTS / "speed.md"
 README = DOCS.parent / "README.md"
 
 
@@ -94,33 +98,22 @@ def whole_calls(found: dict[str, Any]) -> str:
     return table(heads, rows)
 
 
-def shipped(found: dict[str, Any]) -> str:
+def shipped(found: dict[str, Any], other: dict[str, Any]) -> str:
+    """Whole calls of the networks of the package on two machines."""
+    rows = []
+    for name, row in found["shipped"].items():
+        times = [each["total"][share] for each in (row, other["shipped"][name]) for share in ("p50", "p99")]
+        rows.append([name, str(row["points"]), *map(ms, times)])
+    return table(["network", "points", "EPYC", "p99", "Xeon", "p99"], rows)
+
+
+def stages(found: dict[str, Any]) -> str:
     names = list(dict.fromkeys(stage for row in found["shipped"].values() for stage in row["stages_ms"]))
     rows = []
     for name, row in found["shipped"].items():
-        stages = [ms(row["stages_ms"][each]) if each in row["stages_ms"] else "-" for each in names]
-        rows.append(
-            [name, str(row["points"]), str(row["found"]), *stages, ms(row["total"]["p50"]), ms(row["total"]["p99"])]
-        )
-    return table(["network", "points", "found", *names, "whole call", "p99"], rows)
-
-
-def both_machines(first: dict[str, Any], second: dict[str, Any]) -> str:
-    """The same calls on two machines."""
-    one, other = _medians(first), _medians(second)
-    rows = [[name, ms(one[name]), ms(other[name]), f"{other[name] / one[name]:.1f}"] for name in one]
-    return table(["network", "EPYC", "Xeon", "Xeon / EPYC"], rows)
-
-
-def _medians(found: dict[str, Any]) -> dict[str, float]:
-    """Median times [ms] of some calls on a machine."""
-    made = {}
-    for kind, title in (("session", "session"), ("whole", "whole call")):
-        made |= {f"{name}, {title}": found["whole_calls"][name][kind]["p50"] for name in ("5x4", "13x16")}
-    made |= {f"`{name}`": found["shipped"][f"{name}, to 14 m"]["total"]["p50"] for name in ("ball", "soccer")}
-    return made | {
-        name: found["peers"]["calls"][name]["p50"] for name in ("SSDLite MobileNet v3, 320", "YOLO nano, 640")
-    }
+        times = [ms(row["stages_ms"][each]) if each in row["stages_ms"] else "-" for each in names]
+        rows.append([name, str(row["found"]), *times])
+    return table(["network", "found", *names], rows)
 
 
 def speed(found: dict[str, Any]) -> str:
@@ -133,14 +126,16 @@ def speed(found: dict[str, Any]) -> str:
     return table(["network", "points", "whole call, median", "p99"], rows)
 
 
-def peers(found: dict[str, Any]) -> str:
-    calls = found["peers"]["calls"]
-    base = calls["Visual Mesh 5x4"]
-    rows = [
-        [name, ms(row["p50"]), ms(row["p99"]), f"{row['p50'] / base['p50']:.1f}", ms(row["first"])]
-        for name, row in sorted(calls.items(), key=lambda item: item[1]["p50"])
-    ]
-    return table(["detector", "whole call", "p99", "relative to 5x4", "first call (cold CPU cache)"], rows)
+def peers(found: dict[str, Any], other: dict[str, Any]) -> str:
+    """Whole calls on two machines, and how much longer they take than the first network, which is ours."""
+    rows = []
+    for name, row in sorted(found["peers"]["calls"].items(), key=lambda item: item[1]["p50"]):
+        line = [name]
+        for each in (found, other):
+            calls = each["peers"]["calls"]
+            line += [ms(calls[name]["p50"]), f"{calls[name]['p50'] / calls['Visual Mesh 5x4']['p50']:.1f}"]
+        rows.append([*line, ms(row["first"])])
+    return table(["detector", "EPYC", "relative", "Xeon", "relative", "first call, EPYC"], rows)
 
 
 def instruction_sets(found: dict[str, Any]) -> str:
@@ -167,19 +162,21 @@ def growth(found: dict[str, Any]) -> str:
 
 
 def walks(found: dict[str, Any]) -> str:
-    rows, colds = [], []
+    rows = [
+        [name, f"{row['height_m']:g}", f"{100 * row['hit_rate']:.1f} %", f"{row['cache_mib']:.1f}"]
+        for name, part in found["walks"].items()
+        for row in part["walks"]
+    ]
+    return table(["mesh of", "height [m]", "hits after the first swing", "cache [MiB]"], rows)
+
+
+def cold(found: dict[str, Any]) -> str:
+    """The time to prepare a bucket."""
+    rows = []
     for name, part in found["walks"].items():
-        rows += [
-            [name, f"{row['height_m']:g}", f"{100 * row['hit_rate']:.1f} %", f"{row['cache_mib']:.1f}"]
-            for row in part["walks"]
-        ]
-        cold = [
-            ms(part["cold"][kind][share]) for kind in ("bucket_ms", "mesh_and_bucket_ms") for share in ("p50", "p99")
-        ]
-        colds.append([name, *cold])
-    heads = ["mesh of", "height [m]", "hits after the first swing", "cache [MiB]"]
-    cold_heads = ["mesh of", "bucket", "p99", "bucket and mesh", "p99"]
-    return table(heads, rows) + "\n\n" + table(cold_heads, colds)
+        kinds = [part["cold"][kind] for kind in ("bucket_ms", "mesh_and_bucket_ms")]
+        rows.append([name, *(ms(kind[share]) for kind in kinds for share in ("p50", "p99"))])
+    return table(["mesh of", "bucket", "p99", "bucket and mesh", "p99"], rows)
 
 
 def soak(found: dict[str, Any]) -> str:
@@ -191,17 +188,23 @@ def soak(found: dict[str, Any]) -> str:
     return f"{marks}\n\nMemory growth after the first 10 % of the run: {100 * row['growth_since_a_tenth']:.2f} %."
 
 
-TABLES = {
-    "machine": machine,
-    "sessions": sessions,
-    "whole-calls": whole_calls,
-    "shipped": shipped,
-    "peers": peers,
-    "instruction-sets": instruction_sets,
-    "growth": growth,
-    "walks": walks,
-    "soak": soak,
-}
+def tables() -> dict[Path, dict[str, str]]:
+    """All tables of each page, by the names of their marks."""
+    found, other = (json.loads(file.read_text()) for file in (RESULTS, OTHER_MACHINE))
+    of_both = {"shipped": shipped(found, other), "peers": peers(found, other)}
+    return {
+        PAGE: {"machine": machine(found), **of_both, "cold": cold(found)},
+        SPEED: {
+            "sessions": sessions(found),
+            "whole-calls": whole_calls(found),
+            "stages": stages(found),
+            "growth": growth(found),
+            "instruction-sets": instruction_sets(found),
+            "walks": walks(found),
+            "soak": soak(found),
+        },
+        README: {"speed": speed(found)},
+    }
 
 
 def plot_peers(found: dict[str, Any], path: Path) -> None:
@@ -277,12 +280,11 @@ def plot_growth(found: dict[str, Any], path: Path) -> None:
 
 
 def main() -> None:
+    for page, parts in tables().items():
+        fill(page, parts)
     found = json.loads(RESULTS.read_text())
-    other = json.loads(OTHER_MACHINE.read_text())
-    fill(PAGE, {name: made(found) for name, made in TABLES.items()} | {"both machines": both_machines(found, other)})
-    fill(README, {"speed": speed(found)})
     plot_peers(found, DOCS / "performance-peers.png")
-    plot_roofline(json.loads(PEER_TIMES.read_text()), DOCS / "performance-roofline.png")
+    plot_roofline(json.loads(PEER_TIMES.read_text()), EXPERIMENTS / "speed-roofline.png")
     plot_growth(found, DOCS / "performance-growth.png")
 
 
