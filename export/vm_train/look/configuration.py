@@ -162,14 +162,11 @@ class PatchAugmentation:
     hidden: float = share(0.2, "share of the patches of which a rectangle is hidden")
     gamma: float = number(0.15, "standard deviation of the logarithm of the gamma exponent", "", (0.0, 2.0))
     gain: float = number(0.12, "standard deviation of the logarithm of each color channel's gain", "", (0.0, 2.0))
-    swap: float = share(0.0, "share of the patches whose color channels are permuted")
     gray: float = share(0.03, "share of the patches without color")
     blur_share: float = share(0.1, "share of the patches that are blurred")
     blur: tuple[float, float] = range_of(0.4, 1.0, "range of the blur's standard deviation", "samples", (0.1, 3.0))
     noise_share: float = share(0.2, "share of the patches with noise")
     noise: float = number(0.02, "largest standard deviation of the noise, as a share of white", "", (0.0, 1.0))
-    jpeg_share: float = share(0.0, "share of the patches that are compressed as JPEG")
-    jpeg: tuple[float, float] = range_of(30.0, 90.0, "range of the JPEG quality", "", (1.0, 100.0))
 
     def __post_init__(self) -> None:
         check_entries(self)
