@@ -49,7 +49,7 @@ class Ball:
 
 balls = st.builds(
     Ball,
-    distance=st.sampled_from([0.2, 1.0, 1.9, 2.1, 3.0, 4.1, 9.0]),
+    distance=st.sampled_from([0.2, 1.1, 1.9, 2.1, 3.1, 4.1, 9.1]),
     bearing=st.floats(-3.0, 3.0),
     size=st.sampled_from([0.05, 0.1, 0.12]),
     radius=st.sampled_from([1.0, 2.0, 2.9, 3.0, 5.0, 19.9, 40.0, 500.0]),
