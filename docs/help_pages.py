@@ -43,7 +43,7 @@ def pages() -> dict[Path, str]:
 
 
 def site_pages() -> dict[str, str]:
-    """The pages of the web site that are no files of the repository: their names and texts."""
+    """The pages that only the web site has: their names and texts."""
     return {"command-line.md": command_line(), "api.md": api_page.page()}
 
 

@@ -83,7 +83,8 @@ def run_boxes(options: argparse.Namespace) -> int:
 
 def _radius_of(frames: Sequence[BoxedPicture]) -> float | None:
     """The radius [m] in the object.toml beside all frames, if it is the same. Raises InputError."""
-    radii = {getattr(read_object_file(each), "radius", None) for each in {frame.image.parent for frame in frames}}
+    shapes = [read_object_file(each) for each in {frame.image.parent for frame in frames}]
+    radii = {None if each is None else each.radius for each in shapes}
     return radii.pop() if len(radii) == 1 else None
 
 
@@ -133,8 +134,8 @@ def _about(options: argparse.Namespace, models: dict[str, ModelFile], whole: boo
         "networks": [{"file": name, "sha256": each.sha256} for name, each in models.items()],
         "measured": "whole detector" if whole else "close look",
         "boxes": str(options.boxes),
-        "list": options.list and str(options.list),
-        "part": options.list and (options.part or "test"),
+        "list": None if options.list is None else str(options.list),
+        "part": None if options.list is None else options.part or "test",
     }
 
 

@@ -41,7 +41,7 @@ def run_training(
     from ..runs.run import locked
 
     workers = options.workers or len(os.sched_getaffinity(0)) if alone else options.workers
-    if workers is None or workers > alone:
+    if workers is None or workers > (1 if alone else 0):  # these processes share memory
         check_shared_memory()
     with set_up_hardware(options.device, workers, options.threads) as hardware, ExitStack() as held:
         if alone and hardware.size > 1:
