@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from vm_embedded.errors import InputError
-from vm_embedded.network.look_test import ANSWERS
+from vm_embedded.network.look_example import ANSWERS
 
 _WIDEST = 1024
 """Limit of every width."""
@@ -87,7 +87,8 @@ class LookNetwork(nn.Module):
             [
                 nn.Conv2d(3, half, 3, stride=2, padding=1),
                 nn.Conv2d(half, quarter, 3, stride=2, padding=1),
-                nn.Conv2d(quarter, quarter, 3, padding=1),
+                nn.Conv2d(quarter, quarter, 3, padding=1, groups=quarter),
+                nn.Conv2d(quarter, quarter, 1),
                 nn.Conv2d(quarter, eighth, 3, stride=2, padding=1),
             ]
         )
