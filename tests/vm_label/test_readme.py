@@ -51,7 +51,7 @@ def test_the_readme_leads_from_a_recording_to_a_tuned_network(tmp_path):
     assert "in 4 frames for the test, it finds" in shown["vm-train"]
     assert "4 of 12 frames of judged" in shown["vm-evaluate"]
     assert "the whole detector" in shown["vm-evaluate"]
-    networks = json.loads((tmp_path / "report" / "scores.json").read_text())["networks"]
+    networks = json.loads((tmp_path / "gain" / "scores.json").read_text())["networks"]
     assert [each["network"] for each in networks] == ["ball", "tuned/model.onnx"]
     assert networks[0]["scores"]["all"]["boxes"] == 4
     assert read_model(tmp_path / "tuned" / "model.onnx").manifest.look is not None
