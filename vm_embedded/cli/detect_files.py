@@ -88,7 +88,7 @@ def _process_all(source: Source, work: _Pass) -> None:
 
     What is wrong with several frames is printed for the first one, and at the end with their number.
     """
-    bar, reasons = ProgressBar(source.count), Counter[str]()
+    bar, reasons = ProgressBar(source.count, unit="frames"), Counter[str]()
     for frame in source.frames:
         if work.tracker is not None and frame.index == 0:
             work.tracker.time(frame)  # without times, no frame can be processed
