@@ -34,7 +34,7 @@ CLAIMS = {
     "fine-tuned, five",
     "Precision": "75 %, hexagonal, deep/depth, 2.5 m, constant, nois, peak, 0 m, distance, five",
     "Detections": "false positives, distan, size",
-    "Execution performance": "1280 x 1024, projec, GPU",
+    "Execution performance": "1280 x 1024, project, GPU",
     "Discussion and Conclusion": "nine, five, SSD MobileNet, RCNN, YOLOv3, 4 m, graph diameter, "
     "best fitting subgraph, resolution, declin, scale/scaling, rotations, orientation, goal posts, lens, height, "
     "below the camera, twice as many points",
