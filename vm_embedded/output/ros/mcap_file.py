@@ -26,7 +26,8 @@ from ...files import check_writable, put_in_place, real_path, unused_name
 from ...geometry.lens import Lens
 from ...geometry.orientation import Orientation
 from .annotations import image_annotations
-from .detection_messages import detection_2d_array, detection_3d_array, diagnostic_array, header_of
+from .detection_messages import FrameResults, diagnostic_array, header_of
+from .topics import TOPICS
 
 _CAMERA_FRAME = "camera_optical"
 _RATE = 30.0
@@ -83,12 +84,14 @@ class McapFile:
         if info is not None:
             self._add(now, "/camera/camera_info", "CameraInfo", info)
         self._add(now, "/camera/image/compressed", "CompressedImage", jpeg_message(types, in_image, image))
-        for name, kind, message in (
-            ("detections_2d", "Detection2DArray", detection_2d_array(types, in_image, detections, orientation)),
-            ("detections_3d", "Detection3DArray", detection_3d_array(types, on_plane, detections, np.zeros(2))),
-            ("annotations", "ImageAnnotations", image_annotations(types, stamp, detections)),
-        ):
-            self._add(now, f"/{NODE}/{name}", kind, message)
+        results = FrameResults(types, in_image, on_plane, detections, orientation, np.zeros(2))
+        for name, (kind, make) in TOPICS.items():
+            message = make(results)
+            if message is not None:
+                self._add(now, f"/{NODE}/{name}", kind, message)
+        self._add(now, f"/{NODE}/annotations", "ImageAnnotations", image_annotations(types, stamp, detections))
+        drawn = jpeg_message(types, on_plane, detections.draw_map())
+        self._add(now, f"/{NODE}/map/compressed", "CompressedImage", drawn)
         self.write_state(frame, "ok", "")
 
     def write_state(self, frame: Frame, state: str, reason: str) -> None:
