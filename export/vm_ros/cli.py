@@ -94,7 +94,9 @@ def parameter_options(parameters: Mapping[str, Any]) -> list[str]:
     words = []
     for name, value in parameters.items():
         option = name.replace("_", "-")
-        words.append(f"--{option}={value}" if not isinstance(value, bool) else f"--{option if value else f'no-{option}'}")
+        words.append(
+            f"--{option}={value}" if not isinstance(value, bool) else f"--{option if value else f'no-{option}'}"
+        )
     return words
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from types import SimpleNamespace
@@ -59,7 +59,7 @@ class RclpyMiddleware:
         except RuntimeError as error:  # also those of the bindings
             raise InputError(f"ROS rejects what stands behind --ros-args: {one_line(error)}") from error
         self._node = rclpy.create_node(name, automatically_declare_parameters_from_overrides=True)
-        self.parameters = {
+        self.parameters: Mapping[str, Any] = {
             each: parameter.value
             for each, parameter in self._node.get_parameters_by_prefix("").items()
             if each not in _OWN_PARAMETERS and not each.startswith("qos_overrides.")
@@ -67,7 +67,7 @@ class RclpyMiddleware:
         if self._node.get_parameter("use_sim_time").value:
             self.parameters = {"ros_clock": "arrival", **self.parameters}
         self.remark = (
-            f"topics of {', '.join(self._missing)} are left out; to have them, run: {_install(self._missing)}"
+            f"topics with messages of these packages are left out; to have them, {_install(self._missing)}"
             if self._missing
             else ""
         )
@@ -86,7 +86,7 @@ class RclpyMiddleware:
     def _class(self, message: str) -> Any:
         if not hasattr(self.types, message):
             package = MESSAGES[message].split("/")[0]
-            raise InputError(f"ROS lacks the package {package}; run: {_install([package])}")
+            raise InputError(f"ROS lacks the messages {message}: {_install([package])}")
         return getattr(self.types, message)
 
     def start(self) -> None:
@@ -119,7 +119,7 @@ def _message_classes() -> tuple[SimpleNamespace, list[str]]:
 
 
 def _install(packages: Sequence[str]) -> str:
-    """The command that installs packages of ROS."""
+    """How to install packages of messages."""
     distribution = os.environ.get("ROS_DISTRO", "")
-    names = (f"ros-{distribution}-{each}" if distribution else f"ros-{each}" for each in packages)
-    return f"{'sudo apt' if distribution else 'pip'} install {' '.join(names)}".replace("_", "-")
+    names = " ".join(f"ros-{distribution}-{each.replace('_', '-')}" for each in packages)
+    return f"run: sudo apt install {names}" if distribution else f"install {', '.join(packages)}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import cv2
 import numpy as np
 
 from ..arrays import Floats, Image
 from ..borders.opencv_text import draw_text
-from ..field.features import FieldFeatures
+from ..field.features import FieldFeatures, Upright
 from .detection import Detection
 from .field_of_view import REACH, field_of_view
 from .field_overlay import BORDER, POST, ROBOT
@@ -25,7 +26,7 @@ _MARGIN = 0.5
 _RING = 2.0
 """Distance between the rings around the camera [m]."""
 
-_SEEN, _RINGS, _LINE = (70, 110, 60), (95, 95, 95), (255, 255, 255)
+_SEEN, _RINGS, _LINE = (60, 95, 50), (140, 140, 140), (255, 255, 255)
 _FRACTION = 4
 """Binary digits of a pixel in drawings of OpenCV."""
 
@@ -52,8 +53,8 @@ def draw_overhead(view: PreparedView, objects: Sequence[Detection], field: Field
         radius = round(_SCALE * distance)
         cv2.circle(canvas, camera, radius, _RINGS, 1, cv2.LINE_AA)
         draw_text(canvas, f"{distance:.0f} m", (camera[0] + 4, camera[1] - radius - 4), 0.45, _RINGS)
-    cv2.fillPoly(canvas, [np.array(camera) + [(-8, 10), (0, -12), (8, 10)]], OBJECT, cv2.LINE_AA)
-    things = [(each, each.position[:2], view.shape.radius, OBJECT) for each in objects]
+    cv2.fillPoly(canvas, [np.add(camera, [(-8, 10), (0, -12), (8, 10)])], OBJECT, cv2.LINE_AA)
+    things: list[tuple[Detection | Upright, float, Color]] = [(each, view.shape.radius, OBJECT) for each in objects]
     if field is not None:
         if field.border is not None:
             draw(field.border.points, BORDER)
@@ -63,18 +64,18 @@ def draw_overhead(view: PreparedView, objects: Sequence[Detection], field: Field
             draw(field.circle.outline, _LINE)
         for goal in field.goals:
             draw(np.stack([field.posts[each].position for each in goal]), POST)
-        things += [(each, each.position, 0.5 * each.width, POST) for each in field.posts]
-        things += [(each, each.position, 0.5 * each.width, ROBOT) for each in field.robots]
+        things += [(each, 0.5 * each.width, POST) for each in field.posts]
+        things += [(each, 0.5 * each.width, ROBOT) for each in field.robots]
     labels = Labels(canvas, 0.8)
-    for each, place, radius, color in things:
-        (pixel,) = pixels(place[None])
+    for each, half, color in things:
+        (pixel,) = pixels(each.position[None, :2])
         if ((pixel >= 0) & (pixel < (width, height))).all():
-            size = max(4.0, _SCALE * radius)
+            size = max(4.0, _SCALE * half)
             cv2.circle(canvas, np.rint(pixel).astype(int).tolist(), round(size), color, cv2.FILLED, cv2.LINE_AA)
             labels.write(f"{each.class_name} {each.distance:.2f} m", pixel, size, color)
     return canvas
 
 
-def _fixed(pixels: Floats) -> np.ndarray:
+def _fixed(pixels: Floats) -> Any:
     """Pixels (n, 2) as OpenCV takes them with `shift`."""
     return np.rint(pixels * 2**_FRACTION).astype(np.int32)

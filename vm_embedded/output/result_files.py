@@ -35,7 +35,7 @@ def save_overlay(path: Path, frame: Frame, detections: Detections) -> None:
 def save_map(path: Path, frame: Frame, detections: Detections) -> None:
     """Write a .png: what the frame shows, from above. Raises InputError as `save_overlay` does."""
     _check_beside(path, frame, "--save-map")
-    write_file(path, encode_png(detections.draw_map()))
+    write_file(path, cv2.imencode(".png", detections.draw_map())[1].tobytes())
 
 
 def _check_beside(path: Path, frame: Frame, option: str) -> None:

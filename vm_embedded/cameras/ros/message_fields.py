@@ -1,7 +1,7 @@
 """The messages of ROS 2 that this project reads and writes: their fields in the order of their .msg files.
 
-vision_msgs and visualization_msgs are those of ROS 2 Humble and later. Tests compare the bytes of each message with those of the library
-rosbags.
+vision_msgs and visualization_msgs are those of ROS 2 Humble and later. Tests compare the bytes of each message with
+those of the library rosbags.
 """
 
 from __future__ import annotations

@@ -91,9 +91,7 @@ def _detection_3d(frame: FrameResults, detection: Detection) -> Any:
     return types.Detection3D(
         header=frame.on_plane,
         results=[_hypothesis(types, detection, frame.pose(detection.position))],
-        bbox=types.BoundingBox3D(
-            center=frame.pose(detection.position), size=types.Vector3(x=side, y=side, z=side)
-        ),
+        bbox=types.BoundingBox3D(center=frame.pose(detection.position), size=types.Vector3(x=side, y=side, z=side)),
         id=_track_id(detection),
     )
 

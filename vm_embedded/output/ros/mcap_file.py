@@ -78,11 +78,10 @@ class McapFile:
         in_image, on_plane = header_of(types, stamp, _CAMERA_FRAME), header_of(types, stamp, self._plane_frame)
         image = detections.observation.pyramid.bgr()
         height, width = image.shape[:2]
+        info = camera_info_message(types, in_image, lens, (width, height))
         pose = transform_message(types, on_plane, _CAMERA_FRAME, orientation)
         self._add(now, "/tf", "TFMessage", types.TFMessage(transforms=[pose]))
-        info = camera_info_message(types, in_image, lens, (width, height))
-        if info is not None:
-            self._add(now, "/camera/camera_info", "CameraInfo", info)
+        self._add(now, "/camera/camera_info", "CameraInfo", info)
         self._add(now, "/camera/image/compressed", "CompressedImage", jpeg_message(types, in_image, image))
         results = FrameResults(types, in_image, on_plane, detections, orientation, np.zeros(2))
         for name, (kind, make) in TOPICS.items():
