@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.check_config:
         return _check(options)
     log = EventLog()
-    return run_daemon(log, lambda: _prepare(given[:cut], given[cut + 1 :], log))
+    return run_daemon(log, lambda: _prepare(given[:cut], given[cut + 1 :], options, log))
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -79,9 +79,11 @@ def _check(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-async def _prepare(words: Sequence[str], ros_arguments: Sequence[str], log: EventLog) -> Daemon:
-    """Connect to ROS, and prepare a daemon that publishes there. Raises VisualMeshError."""
-    middleware = connect(NODE, ros_arguments)
+async def _prepare(
+    words: Sequence[str], ros_arguments: Sequence[str], options: argparse.Namespace, log: EventLog
+) -> Daemon:
+    """Connect to ROS, and prepare a daemon that publishes there. options: of `words`. Raises VisualMeshError."""
+    middleware = connect(NODE, ros_arguments, configuration(options).ros.middleware)
     if middleware.remark:
         log("ros", "warning", remark=middleware.remark)
     options = parser().parse_args([*parameter_options(middleware.parameters), *words])

@@ -52,7 +52,7 @@ class RclpyMiddleware:
     """A node of rclpy, which a thread spins. Raises InputError for wrong arguments."""
 
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
-        self.types, self._missing = _message_classes()
+        self.types, self._missing = message_classes()
         # The daemon handles signals.
         try:
             rclpy.init(args=["--ros-args", *arguments], signal_handler_options=SignalHandlerOptions.NO)
@@ -106,7 +106,7 @@ class RclpyMiddleware:
         rclpy.try_shutdown()
 
 
-def _message_classes() -> tuple[SimpleNamespace, list[str]]:
+def message_classes() -> tuple[SimpleNamespace, list[str]]:
     """The classes of all messages whose packages are installed, and the names of the other packages."""
     classes, missing = {}, set[str]()
     for full in FIELDS:

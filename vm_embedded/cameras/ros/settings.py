@@ -28,6 +28,11 @@ class RosSettings:
         "clock of the stamps; wall: the system's clock; arrival: another clock, as when a bag is played; its offset is "
         "estimated from the times of arrival",
     )
+    middleware: str = one_of(
+        ("auto", "rclpy", "cyclonedds"),
+        "auto",
+        "package that connects vm-ros to ROS 2; auto: rclpy where ROS is sourced, otherwise cyclonedds",
+    )
     namespace: str = text_line(f"/{NODE}", "first part of the topics that vm-ros publishes")
 
     def __post_init__(self) -> None:
