@@ -21,7 +21,7 @@ from vm_embedded.cameras.open_camera import ROS, Opener, camera_opener
 from vm_embedded.cameras.ros.camera_poses import newest_pose, orientation_of
 from vm_embedded.cameras.ros.images import jpeg_message
 from vm_embedded.cameras.ros.lens import lens_of
-from vm_embedded.cameras.ros.settings import NODE, camera_info_beside
+from vm_embedded.cameras.ros.settings import DEBUG_IMAGE, MAP, NODE, camera_info_beside
 from vm_embedded.cameras.ros.stamps import StampClock, seconds_of, stamp_of
 from vm_embedded.cameras.ros.transforms import Transform, TransformTree
 from vm_embedded.errors import InputError, VisualMeshError
@@ -75,8 +75,8 @@ class Node:
             for name, (message, make) in TOPICS.items()
             if hasattr(types, message)
         ]
-        self._debug_image = middleware.publisher(f"{prefix}/debug_image/compressed", "CompressedImage")
-        self._map = middleware.publisher(f"{prefix}/map/compressed", "CompressedImage")
+        self._debug_image = middleware.publisher(f"{prefix}/{DEBUG_IMAGE}", "CompressedImage")
+        self._map = middleware.publisher(f"{prefix}/{MAP}", "CompressedImage")
         self._diagnostics = middleware.publisher("/diagnostics", "DiagnosticArray")
 
     def opener(self, settings: CameraSettings, raw: bool) -> Opener:

@@ -49,6 +49,8 @@ def made(types, full, values):
             filled[name] = types.octets(bytes(value))
         elif kind.startswith("float64["):
             filled[name] = types.doubles(value)
+        elif kind == "byte" and isinstance(types.DiagnosticStatus.OK, bytes):
+            filled[name] = bytes([value])  # in rclpy
         elif single in NUMBERS:
             filled[name] = value
         elif "[" in kind:

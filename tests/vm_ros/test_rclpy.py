@@ -17,7 +17,7 @@ from tests.vm_embedded.output.features import DEMO
 from vm_embedded import read_lens_file
 from vm_embedded.cameras.ros.bag_types import bag_types
 from vm_embedded.cameras.ros.lens import camera_info_message, lens_of
-from vm_embedded.cameras.ros.message_fields import FIELDS
+from vm_embedded.cameras.ros.message_fields import FIELDS, short_name
 from vm_embedded.cameras.ros.stamps import seconds_of, stamp_of
 from vm_embedded.cameras.ros.transforms import transform_message
 from vm_embedded.geometry.lens_files import format_lens_file

@@ -11,6 +11,9 @@ CLOCKS = ("wall", "arrival")
 NODE = "vm_ros"
 """Name of the node, and first part of the topics that it publishes."""
 
+DRAWN = DEBUG_IMAGE, MAP = ("debug_image/compressed", "map/compressed")
+"""The topics of images that it draws."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RosSettings:

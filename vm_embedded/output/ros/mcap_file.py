@@ -17,7 +17,7 @@ from ...cameras.ros.bag_types import bag_types, import_rosbags, typestore
 from ...cameras.ros.images import jpeg_message
 from ...cameras.ros.lens import camera_info_message
 from ...cameras.ros.message_fields import MESSAGES
-from ...cameras.ros.settings import NODE
+from ...cameras.ros.settings import MAP, NODE
 from ...cameras.ros.stamps import stamp_of
 from ...cameras.ros.transforms import transform_message
 from ...detection.detections import Detections
@@ -30,8 +30,9 @@ from .detection_messages import FrameResults, diagnostic_array, header_of
 from .topics import TOPICS
 
 _CAMERA_FRAME = "camera_optical"
-_RATE = 30.0
-"""Frames per second of frames without a time [1/s]."""
+_RATE = 5.0
+"""Rate of frames without a time [1/s]: so slow that a bag's reader does not take the poses of unrelated images for
+jumps of one camera."""
 
 _ONE_DAY = 86400.0
 
@@ -90,7 +91,7 @@ class McapFile:
                 self._add(now, f"/{NODE}/{name}", kind, message)
         self._add(now, f"/{NODE}/annotations", "ImageAnnotations", image_annotations(types, stamp, detections))
         drawn = jpeg_message(types, on_plane, detections.draw_map())
-        self._add(now, f"/{NODE}/map/compressed", "CompressedImage", drawn)
+        self._add(now, f"/{NODE}/{MAP}", "CompressedImage", drawn)
         self.write_state(frame, "ok", "")
 
     def write_state(self, frame: Frame, state: str, reason: str) -> None:
