@@ -192,23 +192,27 @@ def values(message):
 
 @pytest.mark.long
 def test_no_stamp_of_a_minute_is_lost_or_reordered(tmp_path, peer_of, frames):
-    """Each frame that vm-ros has answered is in each topic, in order."""
-    topics = {"/vm_ros/markers": "MarkerArray", "/vm_ros/robot_poses": "PoseArray"}
-    peer = peer_of(topics)
-    options = ("--ros-image", PICTURE, "--pose-source", f"topic:{POSE}", "--pose-frame", "optical", "--model", "soccer")
-    with running(tmp_path, *options, "--max-distance", "2", "--ros-middleware", "rclpy") as node:
+    """At 30 pictures a second, each frame that vm-ros has answered is in the topic, in order."""
+    peer = peer_of({"/vm_ros/markers": "MarkerArray"})
+    path, lens, orientation = frames[0]
+    small = cv2.resize(cv2.imread(str(path)), (320, 256))
+    pictures = []
+    for number in range(30):  # a camera that repeats an image counts as lost
+        pictures.append(tmp_path / f"{number}.jpg")
+        cv2.imwrite(str(pictures[-1]), cv2.circle(small.copy(), (10 * number, 20), 5, (0, 0, 0), cv2.FILLED))
+    options = ("--ros-image", PICTURE, "--pose-source", f"topic:{POSE}", "--pose-frame", "optical")
+    with running(tmp_path, *options, "--ros-middleware", "rclpy") as node:
         node.wait(lambda: peer.connected() and "ready" in [each["event"] for each in node.events])
-        sent, due = 0, time.monotonic()
-        while sent < 1800:
-            peer.send(*frames[0])
-            sent, due = sent + 1, due + 1.0 / 30.0
+        due = time.monotonic()
+        for sent in range(1800):
+            peer.send(pictures[sent % 30], lens.for_image((320, 256)), orientation)
+            due += 1.0 / 30.0
             time.sleep(max(0.0, due - time.monotonic()))
         node.wait(lambda: len(peer.received["/vm_ros/markers"]) >= len(node.frames) > 0)
         node.stop()
-    answered = [round(each["wall"], 4) for each in node.frames]
-    for topic in topics:
-        assert [round(seconds_of(stamped(each)), 4) for each in peer.received[topic]] == answered
-    print(f"{len(answered)} of {sent} pictures were answered")
+    answered = [round(each["wall"], 3) for each in node.frames]
+    assert [round(seconds_of(stamped(each)), 3) for each in peer.received["/vm_ros/markers"]] == answered
+    print(f"{len(answered)} of 1800 pictures were answered")
 
 
 def test_a_topic_without_its_package_is_named(tmp_path, peer_of):

@@ -39,7 +39,7 @@ def marker_array(frame: FrameResults) -> Any:
         ends = np.array([each.ends for each in field.lines]).reshape(-1, 2)
         drawn.add("lines", _LINE_LIST, _LINE, (_STROKE, 0.0, 0.0), ends)
         if field.circle is not None:
-            drawn.add("circle", _LINE_STRIP, _LINE, (_STROKE, 0.0, 0.0), field.circle.outline)
+            drawn.add("circle", _LINE_STRIP, _LINE, (_STROKE, 0.0, 0.0), field.circle.outline[::3])
         for crossing in field.crossings:
             place = np.append(crossing.position, _LETTER)
             drawn.add("crossings", _TEXT, _LINE, (0.0, 0.0, _LETTER), at=place, text=crossing.kind)
