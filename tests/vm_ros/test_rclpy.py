@@ -36,6 +36,8 @@ from vm_ros.rclpy_middleware import message_classes  # noqa: E402
 
 TYPES, MISSING = message_classes()
 PICTURE, INFO, POSE = "/eye/image_raw/compressed", "/eye/camera_info", "/eye/pose"
+PATIENT = ("--pose-wait-ms", "1000", "--camera-max-age-ms", "10000", "--pose-frame", "optical")
+"""Options with which a busy machine answers, too, only later; and the axes of the poses."""
 
 
 class Peer:
@@ -166,9 +168,9 @@ def test_pictures_of_another_process_give_the_numbers_of_vm_detect(tmp_path, pee
     )
     words = ["-p", "model:=soccer", "-p", f"ros_image:={PICTURE}", "-p", "camera_lost_ms:=8000"]
     words += ["-p", "pose_source:=topic:/pose", "-r", f"/pose:={POSE}", "-r", "/vm_ros/markers:=/seen"]
-    patient = ("--pose-wait-ms", "1000", "--camera-max-age-ms", "10000", "--pose-frame", "optical")
+
     expected = lines(run(tmp_path / "frames", "--model", "soccer", "--max-distance", "6"))
-    with running(tmp_path, *patient, "--ros-middleware", "rclpy", "--ros-args", *words) as node:
+    with running(tmp_path, *PATIENT, "--ros-middleware", "rclpy", "--ros-args", *words) as node:
         node.wait(peer.connected)
         for frame, line in zip(frames, expected, strict=True):
             stamp = peer.send(*frame)
@@ -200,7 +202,7 @@ def test_no_stamp_of_a_minute_is_lost_or_reordered(tmp_path, peer_of, frames):
     for number in range(30):  # a camera that repeats an image counts as lost
         pictures.append(tmp_path / f"{number}.jpg")
         cv2.imwrite(str(pictures[-1]), cv2.circle(small.copy(), (10 * number, 20), 5, (0, 0, 0), cv2.FILLED))
-    options = ("--ros-image", PICTURE, "--pose-source", f"topic:{POSE}", "--pose-frame", "optical")
+    options = ("--ros-image", PICTURE, "--pose-source", f"topic:{POSE}", *PATIENT)
     with running(tmp_path, *options, "--ros-middleware", "rclpy") as node:
         node.wait(lambda: peer.connected() and "ready" in [each["event"] for each in node.events])
         due = time.monotonic()
