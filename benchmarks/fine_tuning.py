@@ -42,8 +42,7 @@ SEEDS = (0, 1, 2)
 
 def measure(model: Path, frames: Sequence[BoxedPicture], name: str) -> dict[str, Any]:
     """The scores of a model file's close look on frames with boxes of a round object."""
-    look = CloseLook.of(read_model(model))
-    assert look is not None
+    look = CloseLook.of(read_model(model))[name]
     radii = search_radii(all_objects(frames, name, True))
     bar = ProgressBar(len(frames), "looked at")
     score = score_frames(look, frames, name, True, radii, bar.advance)
@@ -120,8 +119,8 @@ def main() -> None:
     names = parse_names(options.names)
     training, test = (read_boxes(folder, names=names).pictures for folder in (options.training, options.test))
     before = read_model(model_path(options.model))
-    assert before.manifest.look is not None
-    name = before.manifest.look.object_class
+    name = before.manifest.searched_class
+    assert name is not None
     result: dict[str, Any] = {"network": options.model, "before": measure(before.path, test, name), "after": []}
     print(f"before: {result['before']}", flush=True)
     for count in options.counts:

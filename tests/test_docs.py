@@ -10,6 +10,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -153,7 +154,8 @@ def test_the_training_of_the_readme_uses_the_radii_of_its_pictures():
     assert low < high
     commands = [line for line in shell_lines(README) if line.startswith(("vm-train data", "vm-evaluate runs"))]
     assert len(commands) == 2
-    assert "--set mesh.radius_of=scene" in commands[0]
+    (recipe,) = re.findall(r"--config (\S+)", commands[0])
+    assert tomllib.loads((TOP / recipe).read_text())["mesh"]["radius_of"] == "scene"
     assert "--radius-of scene" in commands[1]
 
 

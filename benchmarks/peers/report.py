@@ -63,7 +63,7 @@ def proposals(found: dict[str, Any]) -> str:
         for name, row in part["networks"].items()
     ]
     for name, row in part["stage"].items():
-        count = row["patches"]["glance"]
+        count = row["patches"]["ball"]
         rows.append([f"whole stage of {name}", "-", "-", f"{row['p50'] / count:.3f}"])
     return table(["network", "MFLOP", "alone", f"in a call of {part['batch']}"], rows)
 
@@ -175,9 +175,7 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
         x, ours = calls[name.partition(", same")[0]]["p50"], name in score.OURS
         y = found[name]["field"]["all"]["ap50"]
         axes.plot(x, y, "o", color="#2a7f62" if ours else "#9aa5b1")
-        left = name == "ball-small"
-        place = {"xytext": (-6 if left else 6, 0), "ha": "right" if left else "left"}
-        axes.annotate(name, (x, y), textcoords="offset points", fontsize=8, va="center", **place)
+        axes.annotate(name, (x, y), textcoords="offset points", fontsize=8, va="center", xytext=(6, 0))
         checked = found[name].get("field, sizes checked")
         if checked:
             axes.plot(x, checked["all"]["ap50"], "o", color="#9aa5b1", fillstyle="none")

@@ -23,11 +23,11 @@ import torch
 from vm_embedded import Detector
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.cli.machine import describe_machine, rss_mib, sgemm_rate
-from vm_embedded.detection.looking import Look, chain_of
+from vm_embedded.detection.looking import Look
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_export.look_network import LookNetwork, LookShape
-from vm_export.look_weights import look_of
+from vm_export.look_weights import looks_of
 
 from ..frames import Frame, frames
 from ..networks import NETWORKS, checkpoint, model_file
@@ -42,7 +42,7 @@ RESULTS = Path(__file__).parents[1] / "peer_times.json"
 RANDOM = {"Visual Mesh 5": "5x4", "Visual Mesh 9": "9x4"}
 """The paper's networks, with random weights, by their names in benchmarks/networks.py."""
 
-PACKAGED = ("ball", "ball-small")
+PACKAGED = ("ball", "soccer")
 SINGLE = (
     Peer("YOLO v1, 448", YoloV1, 448),
     Peer("YOLO v2, 416", YoloV2, 416),
@@ -61,11 +61,8 @@ _SLOW = {"YOLO v1, 448", "YOLO v2, 416", "YOLO v3, 416", TWO_STAGE}
 _ROW, _SLOW_ROW = 30, 3
 """Calls in a row in each turn."""
 
-_PARTS = ("glance", "look", "wide look")
-"""The networks of a close look, in the order in which they judge."""
-
-_BATCH = 40
-"""Proposals of a call: the default of the setting max_proposals."""
+_BATCH = 10
+"""Patches of a call: as many as the networks of the package look at for balls."""
 
 
 class CountedLook:
@@ -73,7 +70,6 @@ class CountedLook:
 
     def __init__(self, look: Look) -> None:
         self.contract, self.patches, self._look = look.contract, 0, look
-        self.glance = None if look.glance is None else CountedLook(look.glance)
 
     def run(self, patches: Image) -> Singles:
         self.patches += len(patches)
@@ -81,11 +77,8 @@ class CountedLook:
 
 
 def look_shapes(name: str) -> dict[str, LookShape]:
-    """The shapes of the networks of a packaged network's close look."""
-    shapes, look = [], look_of(read_model(model_path(name)))
-    while look is not None:
-        shapes, look = [look.network.shape, *shapes], look.glance
-    return dict(zip(_PARTS, shapes, strict=False))
+    """The shapes of the looks of a packaged network, by class."""
+    return {each.contract.object_class: each.network.shape for each in looks_of(read_model(model_path(name)))}
 
 
 def look_operations(shape: LookShape) -> int:
@@ -102,15 +95,14 @@ def own_work(name: str, detector: Detector, frame: Frame) -> dict[str, Any]:
     seen = detector.observe(frame.image, frame.orientation, frame.lens)
     points = len(seen.pixels)
     found: dict[str, Any] = {"points": points, "operations": detector.manifest.operations * points}
-    if detector.look is not None:
-        counted = CountedLook(detector.look)
-        look, detector.look = detector.look, counted
+    if detector.looks:
+        looks, counted = detector.looks, {name: CountedLook(each) for name, each in detector.looks.items()}
+        detector.looks = counted  # type: ignore[assignment]
         own_call(detector, frame)()
-        detector.look = look
-        chain = [each for each in chain_of(counted) if isinstance(each, CountedLook)]
-        found["patches"] = {part: each.patches for part, each in zip(_PARTS, chain, strict=False)}
+        detector.looks = looks
+        found["patches"] = {name: each.patches for name, each in counted.items()}
         found["operations"] += sum(
-            look_operations(shape) * found["patches"][part] for part, shape in look_shapes(name).items()
+            look_operations(shape) * found["patches"][each] for each, shape in look_shapes(name).items()
         )
     return found
 
@@ -130,7 +122,7 @@ def whole_calls(frame: Frame, folder: Path, rounds: int) -> dict[str, Any]:
     """
     ours: dict[str, Detector] = {}
     for name, network in RANDOM.items():
-        file = model_file(checkpoint(*NETWORKS[network]), "runs", folder / f"{network}.onnx")
+        file = model_file(checkpoint(*NETWORKS[network]), folder / f"{network}.onnx")
         ours[name] = Detector(file)
     for name in PACKAGED:
         ours[name] = Detector.from_file(name)
@@ -165,7 +157,7 @@ def classifier_call(classifier: PatchClassifier, count: int) -> Callable[[], obj
 
 
 def proposals(frame: Frame, rounds: int) -> dict[str, Any]:
-    """Times of classifiers for one patch, and for each of 40 in one call [ms]; and the stage look of whole calls."""
+    """Times of classifiers for one patch, and each of a batch in one call [ms]; and the stage look of whole calls."""
     networks: dict[str, tuple[Callable[[int], Callable[[], object]], int]] = {}
     for each in CLASSIFIERS:
         count = operations(each.network, (1, each.channels, each.side, each.side))
@@ -178,12 +170,9 @@ def proposals(frame: Frame, rounds: int) -> dict[str, Any]:
         return partial(look.run, random.integers(0, 256, (count, size, size, 3), dtype=np.uint8))
 
     for name, detector in detectors.items():
-        look, shapes = detector.look, look_shapes(name)
-        assert look is not None
-        for (part, shape), network in zip(shapes.items(), chain_of(look), strict=True):
-            # All packaged networks have the same glance, and ball and soccer the same wide look.
-            title = f"close look of {name}" if part == "look" else part
-            networks[f"{title}, {shape.size} x {shape.size}"] = partial(look_call, network), look_operations(shape)
+        for each, shape in look_shapes(name).items():
+            title = f"close look of {name} at {each}, {shape.size} x {shape.size}"
+            networks[title] = partial(look_call, detector.looks[each]), look_operations(shape)
     calls = {f"{name} / {count}": make(count) for name, (make, _) in networks.items() for count in (1, _BATCH)}
     times = interleaved(calls, rounds, row=10)
     found: dict[str, Any] = {

@@ -112,8 +112,7 @@ struct Detection {
 struct Upright {
     // post or robot
     std::string class_name{};
-    // calibrated probability of a close look; if the class has none, the probability of a peak; if it has no
-    // peaks either, the mean probability of its points; 0 to 1
+    // calibrated probability, 0 to 1
     float confidence{};
     // its base, which is the middle of a post's foot, or the front of a robot's foot, in the direction of its
     // middle [m]

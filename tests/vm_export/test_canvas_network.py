@@ -165,7 +165,7 @@ def test_an_exported_network_detects_with_the_whole_mesh(tmp_path):
 
     export.export(checkpoint(2, mesh="octaves"), tmp_path / "model.onnx")
     model = read_model(tmp_path / "model.onnx")
-    assert (model.manifest.layout, model.manifest.mesh) == ("canvas", "octaves")
+    assert model.manifest.mesh == "octaves"
     assert model.manifest.operations == CanvasShape(1, 8, 2).operations
     image = frozen(np.random.default_rng(1).integers(0, 256, (SIZE[1], SIZE[0], 3), dtype=np.uint8))
     lens = Equisolid(focal_length=150.0, fov=2.4)

@@ -186,7 +186,7 @@ def test_a_broken_checkpoint_is_refused(tmp_path, content):
 
 def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
-    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 3'.* 'vm-embedded checkpoint"):
+    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 4'.* 'vm-embedded checkpoint"):
         LookCheckpoint.load(tmp_path / "model.pt")
     look_checkpoint().save(tmp_path / "look.pt")
     with pytest.raises(InputError, match=r"look\.pt is a close look; attach it to a network: vm-export MODEL --look"):

@@ -53,15 +53,12 @@ class MeshCache:
     A mesh is kept under its height, and the prepared points of a bucket under (height, pitch, roll, lens, size), with
     pitch and roll as numbers of steps.
 
-    arrange: puts points in the network's order; without it, as the manifest says.
-
     `hits`, `misses`, `prepared` (buckets that `prepare_nearby` made) and `nbytes` [bytes] may be read at any time.
     """
 
-    def __init__(self, manifest: Manifest, settings: Settings, arrange: Callable[[Mesh], Layout] | None = None) -> None:
+    def __init__(self, manifest: Manifest, settings: Settings) -> None:
         self.manifest = manifest
         self.settings = settings
-        self._arrange = arrange or (lambda mesh: choose_layout(mesh, manifest))
         self.shape = manifest.mesh_shape
         self.hits = 0
         self.misses = 0
@@ -169,7 +166,7 @@ class MeshCache:
 
     def _in_order(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:
         """The points of a part of a mesh in the network's order, with the levels of their colors."""
-        layout = self._arrange(mesh)
+        layout = choose_layout(mesh, self.manifest)
         return PreparedPoints(layout, levels_for(self.manifest, layout, height, lens))
 
     def _look_up(self, key: Hashable, make: Callable[[], _Kept], counted: bool = True) -> _Kept:

@@ -6,18 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arrays import Floats
 from ..field.features import FieldFeatures
 from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundPoints
-from ..field.uprights import KINDS as UPRIGHTS
 from .looking import Look
 from .observation import Observation
-from .prepared_view import PreparedView
 from .profiles import brightness_along
 from .settings import Settings
-from .upright_looks import find_bases
-from .upright_peaks import peak_bases
+from .upright_bases import find_uprights
 
 _LOWEST = 1e-3
 """Rays less steep than this do not meet the plane near enough to matter."""
@@ -26,21 +22,23 @@ _LOWEST = 1e-3
 def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
     """Goal posts, robots, lines and border; None if the network has no class for any of them.
 
-    looks: look networks for classes of uprights, by class. Peaks show the uprights of the other classes, and rules find
-    those of classes without peaks. Raises ModelError if a look network does not run.
+    looks: look networks by class. Only a network with peaks for them shows posts and robots. Raises ModelError if a
+    look network does not run.
     """
     names = [each.name for each in observation.manifest.classes]
     if not set(ROLES) & set(names):
         return None
     view, pyramid = observation.view, observation.pyramid
-    uprights = [name for name in observation.manifest.peaks if name in UPRIGHTS and name not in looks]
-    bases = {name: peak_bases(observation, name, settings) for name in uprights}
-    bases |= {name: find_bases(observation, look, settings) for name, look in looks.items()}
+    posts, robots = (
+        find_uprights(observation, name, looks.get(name), settings) if name in observation.manifest.peaks else ()
+        for name in ("goal", "robot")
+    )
     return find_features(
         ground_points(observation),
-        lambda places: _pixels(view, places),
+        view.picture_pixels,
         lambda stretches, count: brightness_along(view, pyramid, stretches, count),
-        bases,
+        posts,
+        robots,
     )
 
 
@@ -68,9 +66,3 @@ def ground_points(observation: Observation) -> GroundPoints:
         ),
         ahead=view.heading[:2, 0],
     )
-
-
-def _pixels(view: PreparedView, places: Floats) -> Floats:
-    """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN where the frame does not show them."""
-    pixels = view.plane_pixels(places)
-    return np.where(view.in_picture(pixels)[:, None], pixels, np.nan)

@@ -91,7 +91,7 @@ def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) 
         return
     observation = detector.observe(view.image, orientation, view.lens)
     # Not detector.locate, which would also search for features of the field.
-    for each in locate(observation, detector.look, detector.settings, Stopwatch())[0]:
+    for each in locate(observation, detector.looks, detector.settings, Stopwatch())[0]:
         position = plane.to_world(each.position[None], view.pose)[0]
         away = position - view.pose.position
         yield Sighting(camera, plane.name, each, position, away / np.linalg.norm(away))

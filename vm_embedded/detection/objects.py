@@ -1,13 +1,14 @@
 """From an observation to objects on the plane.
 
-For the class of the close look, peaks or likely points propose places, and a second network judges each of them
-(`looking.py`). Without a close look, the peaks of a class are its objects. For any other class, clusters of likely
-points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`, `judging.py`).
+The peaks of a class are its objects, after a close look if there is one (`looking.py`). Without peaks, clusters of
+likely points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`,
+`judging.py`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import cv2
 import numpy as np
@@ -17,24 +18,28 @@ from .candidates import Candidate, propose
 from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
-from .looking import Judgment, Look, judge_peaks, look_closely
+from .looking import Judgment, Look, judge_peaks
 from .observation import Observation
 from .projection import along
 from .settings import Settings
 from .stopwatch import Stopwatch
 
 _SAME_SIZE = 0.2
-"""With a close look, a Detection's `distance` and `distance_by_angle` agree if its apparent size differs from the
+"""With peaks, a Detection's `distance` and `distance_by_angle` agree if its apparent size differs from the
 expected one by at most this share."""
 
 
 def locate(
-    observation: Observation, look: Look | None, settings: Settings, watch: Stopwatch, explain: bool = False
+    observation: Observation,
+    looks: Mapping[str, Look],
+    settings: Settings,
+    watch: Stopwatch,
+    explain: bool = False,
 ) -> tuple[tuple[Detection, ...], tuple[Detection, ...]]:
     """The objects that an observation shows, most confident first, and, with `explain`, the rejected candidates.
 
-    It searches only for classes of the kind "object". watch: gets the stage cluster; with a close look also propose and
-    look. Raises ModelError if the close look does not run.
+    It searches only for classes of the kind "object". looks: look networks by class. watch: gets the stage cluster;
+    with peaks also propose, with a look look. Raises ModelError if a look network does not run.
     """
     objects: list[Detection] = []
     rejected: list[Detection] = []
@@ -42,11 +47,8 @@ def locate(
         name = object_class.name
         if object_class.kind != "object":
             continue
-        if look is not None and look.contract.object_class == name:
-            judged = look_closely(observation, look, probabilities, settings, watch, explain)
-            found = [_describe_judgment(observation, name, each) for each in judged]
-        elif name in observation.manifest.peaks:
-            judged = judge_peaks(observation, name, settings, explain)
+        if name in observation.manifest.peaks:
+            judged = judge_peaks(observation, observation.peaks[name], looks.get(name), settings, watch, explain)
             found = [_describe_judgment(observation, name, each) for each in judged]
         else:
             candidates = _candidates(observation, name, probabilities, settings)
@@ -60,7 +62,7 @@ def locate(
 def _candidates(
     observation: Observation, class_name: str, probabilities: Singles, settings: Settings
 ) -> list[Candidate]:
-    """The candidates of a class without a close look; those that are not objects have a reason."""
+    """The candidates of a class without peaks; those that are not objects have a reason."""
     view = observation.view
     accepted: list[Candidate] = []
     rejected: list[Candidate] = []
@@ -91,7 +93,7 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
 
 
 def _describe_judgment(observation: Observation, class_name: str, judgment: Judgment) -> Detection:
-    """What a close look saw, as a detection."""
+    """A peak or what a close look saw there, as a detection."""
     view = observation.view
     covered = view.shape.covers(view.layout.rays, judgment.center[None], view.height)[0]
     return _detection(

@@ -39,8 +39,8 @@ class Observation:
     """A frame's n points on screen with their probabilities, before objects are located among them.
 
     pyramid: the frame. view: its mesh points, lens and orientation. manifest: of the network. projected: pixels of the
-    m slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
-    Only original points count as on screen. slot_answers (m, outputs): the network's outputs, as `Manifest.outputs`
+    m slots of the layout. A slot is one place in the network's input; it holds a point or nothing. Points of
+    the margin do not count as on screen. slot_answers (m, outputs): the network's outputs, as `Manifest.outputs`
     counts them; they have no meaning for slots off screen. timing_ms: time of each stage [ms].
     """
 
@@ -85,12 +85,9 @@ class Observation:
         """Probabilities (n, C) of the points, in the order of the manifest's classes."""
         return self.slot_probabilities[self.shown]
 
-    def find_peaks(self, class_name: str, most: int) -> Peaks:
-        """At most `most` peaks of a class that the network has peaks for (`Manifest.peaks`), best first."""
-        return self._peaks[class_name].part(slice(most))
-
     @cached_property
-    def _peaks(self) -> Mapping[str, Peaks]:
+    def peaks(self) -> Mapping[str, Peaks]:
+        """The peaks of each class that the network has peaks for (`Manifest.peaks`), best first."""
         return peaks_of(self.slot_answers, self.projected.on_screen, self.view, self.manifest)
 
 

@@ -82,11 +82,6 @@ def patch_nodes(view: PreparedView, tangents: Tangents, extent: float) -> Single
     return pixels.astype(np.float32).reshape(_NODES, _NODES, -1, 2).transpose(3, 2, 0, 1)
 
 
-def apparent_radii(view: PreparedView, tangents: Tangents) -> Floats:
-    """Radii (c,) in the picture [px] of the objects that are expected in these planes."""
-    return _spacing(patch_nodes(view, tangents, 1.0), 2).astype(np.float64)
-
-
 @lru_cache(maxsize=32)
 def _node_places(extent: float) -> tuple[Floats, Floats]:
     """How far to the right and down (N * N, 1) the nodes of a patch are [expected radii]."""

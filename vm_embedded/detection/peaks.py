@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 
 from ..arrays import Chosen, Floats, Mask, Singles
-from ..field.uprights import first_apart
 from ..network.canvas_layout import CanvasLayout
 from ..network.manifest import PEAK_OUTPUTS, Manifest
 from .prepared_view import PreparedView
@@ -56,6 +55,25 @@ class Peaks:
     def part(self, chosen: Chosen | Mask | slice) -> Peaks:
         """Some of the peaks."""
         return Peaks(self.rays[chosen], self.scores[chosen], self.log_sizes[chosen])
+
+    def apart(self, view: PreparedView) -> Peaks:
+        """The peaks that are not in the object of a better one; view: of objects of their class."""
+        centers = view.shape.center_along(self.rays, view.height)
+        return self.part(first_apart(view.shape.covers(self.rays, centers, view.height)))
+
+
+def first_apart(near: Mask) -> Chosen:
+    """Numbers of those of p places, best first, that are not near a better one that counts itself.
+
+    near (p, p): whether each is so near the place of the row that it is the same one.
+    """
+    numbers = np.arange(len(near))
+    worse = near & (numbers > numbers[:, None])
+    kept = np.ones(len(near), dtype=bool)
+    for better in np.flatnonzero(worse.any(axis=1)):
+        if kept[better]:
+            kept &= ~worse[better]
+    return np.flatnonzero(kept)
 
 
 def probability_of(logits: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Places in a picture to look at, and when two of them show the same object."""
+"""Places in a picture to look at."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from ..arrays import Chosen, Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
 from .observation import Observation
-from .patches import Tangents, apparent_radii, cut_patches, patch_nodes
+from .patches import Tangents, cut_patches, patch_nodes
 from .prepared_view import PreparedView
 
-NEAR = 0.3
+_NEAR = 0.3
 """Places within this share of an object's radius around its center were meant to be its center."""
 
 
@@ -21,17 +21,8 @@ class Places(Protocol):
 
     def __len__(self) -> int: ...
 
-    def cut(self, rows: Chosen, contract: LookContract, zoom: float = 1.0) -> Image:
-        """Patches (k, size, size, 3), RGB, of the places with the numbers `rows` (k,), as a contract describes them.
-
-        zoom: their sides, as a share of those in the contract.
-        """
-
-    def radii(self, rows: Chosen) -> Floats:
-        """Radii (k,) that the objects expected there would have in the picture [px]."""
-
-    def near(self, rows: Chosen) -> Mask:
-        """Which of the places (k,) are so near each other (k, k) that they show one object; each is near itself."""
+    def cut(self, rows: Chosen, contract: LookContract) -> Image:
+        """Patches (k, size, size, 3), RGB, of the places with the numbers `rows` (k,), as a contract describes them."""
 
     def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
         """Move places by shifts (k,) in expected radii. Returns which of them (k,) may hold an object there."""
@@ -52,20 +43,10 @@ class PlanePlaces:
     def __len__(self) -> int:
         return len(self.centers)
 
-    def cut(self, rows: Chosen, contract: LookContract, zoom: float = 1.0) -> Image:
+    def cut(self, rows: Chosen, contract: LookContract) -> Image:
         """See Places."""
-        view = self._observation.view
-        nodes = patch_nodes(view, self._planes(rows), zoom * contract.extent)
+        nodes = patch_nodes(self._observation.view, self._planes(rows), contract.extent)
         return cut_patches(self._observation.pyramid, nodes, contract.size)
-
-    def radii(self, rows: Chosen) -> Floats:
-        """See Places."""
-        return apparent_radii(self._observation.view, self._planes(rows))
-
-    def near(self, rows: Chosen) -> Mask:
-        """See Places."""
-        centers = self.centers[rows]
-        return _near(self._observation.view, centers, centers)
 
     def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
         """See Places. A place that moves to the horizon or above it can't hold an object."""
@@ -89,12 +70,6 @@ def mean_center(view: PreparedView, centers: Floats, probabilities: Singles, num
     Several proposals move to the same object, each with an error of its own. number: of the place.
     """
     rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
-    near = _near(view, centers[[number]], centers)[0]
+    near = view.shape.covers(rays, centers[[number]], view.height, _NEAR)[0]
+    near[number] = True  # far away, rounding may leave it out
     return np.asarray(view.shape.center_along(((near * probabilities) @ rays)[None], view.height)[0])
-
-
-def _near(view: PreparedView, objects: Floats, centers: Floats) -> Mask:
-    """Which places (c, 3) [m] were meant to be the center of each object (n, 3) [m]; (n, c)."""
-    rays = centers / np.linalg.norm(centers, axis=1, keepdims=True)
-    itself = (objects[:, None] == centers).all(axis=2)  # far away, rounding may leave it out
-    return np.asarray(view.shape.covers(rays, objects, view.height, NEAR) | itself)

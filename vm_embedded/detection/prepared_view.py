@@ -65,3 +65,8 @@ class PreparedView(NamedTuple):
     def in_picture(self, pixels: Floats) -> Mask:
         """Which pixels (n, 2) are inside the picture; NaN is not."""
         return np.asarray(((pixels >= 0.0) & (pixels <= np.array(self.size) - 1.0)).all(axis=1))
+
+    def picture_pixels(self, places: Floats) -> Floats:
+        """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
+        pixels = self.plane_pixels(places)
+        return np.where(self.in_picture(pixels)[:, None], pixels, np.nan)

@@ -11,16 +11,18 @@ from ..borders.records import SHARE, SIZE, Record, Sent
 
 _PLACE = Sent(3, (2,))
 
+UPRIGHTS = {"goal": "post", "robot": "robot"}
+"""What the uprights of a class are, by its name."""
+
 
 @dataclass(frozen=True, eq=False)
 class Upright(Record):
     """Something that stands on the plane: a goal post, or a robot or another obstacle.
 
-    class_name: post or robot. confidence: calibrated probability of a close look; if the class has none, the
-    probability of a peak; if it has no peaks either, the mean probability of its points; 0 to 1. position (2,) [m]: its
-    base, which is the middle of a post's foot, or the front of a robot's foot, in the direction of its middle. distance
-    [m]: from the camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the
-    base; NaN outside of the picture. width [m]: as seen from the camera.
+    class_name: post or robot. confidence: calibrated probability, 0 to 1. position (2,) [m]: its base, which is the
+    middle of a post's foot, or the front of a robot's foot, in the direction of its middle. distance [m]: from the
+    camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the base; NaN outside
+    of the picture. width [m]: as seen from the camera.
     """
 
     class_name: Annotated[str, Sent(name="class")]

@@ -18,13 +18,6 @@ from ..arrays import Floats, Indices, Mask, frozen, one_number
 from ..errors import GeometryError
 from ..geometry.shape import Shape
 
-SELF = -1
-"""Stands for the point itself in `Groups`, where a neighbor is named by its position among the point's neighbors."""
-
-Groups = tuple[tuple[int, ...], ...]
-"""Groups of one to three neighbors, each from left to right, that the layout `runs` puts side by side in memory.
-Each neighbor, and SELF, is in exactly one group. (left, SELF, right) comes first."""
-
 MOST_POINTS = 8_000_000
 """Largest number of points in a mesh: more than the pixels of a camera, and more than OpenCV samples at once."""
 
@@ -102,13 +95,14 @@ class Mesh:
 class MeshModel(ABC):
     """A way to place points and to link them.
 
-    neighbors: the number N of neighbors of a point. A network's weights depend on their order. groups: the neighbors
-    that follow each other in memory. steps: (columns, rows) to each neighbor if the points lie on a lattice, else None.
+    neighbors: the number N of neighbors of a point. A network's weights depend on their order. steps: (columns, rows)
+    to each neighbor if the points lie on a lattice, else None. mirrored: without steps, the neighbor (N,) that takes
+    the place of each one in the mirror image.
     """
 
     neighbors: int
-    groups: Groups
     steps: tuple[tuple[int, int], ...] | None = None
+    mirrored: tuple[int, ...] = ()
 
     def build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         """The mesh for objects of this shape, seen from a height [m], out to `max_distance` [m].

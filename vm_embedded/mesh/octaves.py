@@ -21,7 +21,7 @@ import numpy as np
 from ..arrays import Floats, Indices, Mask, frozen
 from ..errors import GeometryError
 from ..geometry.shape import Shape
-from .grids import STEPS, lattice_neighbors, row_groups
+from .grids import STEPS, lattice_neighbors
 from .mesh import STRIDE, Mesh, MeshModel, check_size, rays_from_polar
 from .rings import inclinations
 
@@ -47,7 +47,6 @@ class Octaves(MeshModel):
 
     neighbors = 8
     steps = STEPS[8]
-    groups = row_groups(steps)
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi, columns, strips = _rings_of_strips(shape, height, intersections, max_distance)

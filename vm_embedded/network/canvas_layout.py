@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..arrays import Chosen, Indices, Mask, Singles, frozen
 from ..mesh.mesh import STRIDE, Mesh
 from ..mesh.octaves import BLOCK, GAP
-from .layout import Feeds, WholeLayout, rays_in
+from .layout import Feeds, Layout, rays_in
 
 SMALLEST = 2 * BLOCK
 """Rows and columns of the smallest canvas: networks halve it three times, and training needs several cells then."""
@@ -32,7 +32,7 @@ class Piece:
         return slice(self.row, self.row + self.rows), slice(self.column, self.column + self.columns)
 
 
-class CanvasLayout(WholeLayout):
+class CanvasLayout(Layout):
     """The boxes around the points of each strip, upright, with gaps between them.
 
     shape: rows and columns of the canvas, multiples of BLOCK. pieces: the boxes of the strips. Points in the margin of

@@ -1,8 +1,7 @@
 """The base class of layouts: a mesh in the order that a network takes it.
 
 A layout is prepared once for a mesh. For each frame it only needs to know which points are on screen. It turns the
-links to all other points into links to the off-screen point. All layouts give the same probabilities. The manifest
-names the layout that a model file was written for.
+links to all other points into links to the off-screen point.
 """
 
 from __future__ import annotations
@@ -29,12 +28,11 @@ OFF_SCREEN = np.float32(-1.0)
 class Layout(ABC):
     """The n points of a mesh, laid out in m slots.
 
-    A slot holds a point, a copy of a point, or nothing; an empty slot is a gap. Used as a mesh.PointGraph,
-    its points are the slots. All links lead to original points, never to copies.
+    A slot holds a point or nothing; an empty slot is a gap. Used as a mesh.PointGraph, its points are the slots.
 
     slots: (m,) point of each slot; n in gaps. places: (n,) slot of each point. original: (m,) True for the slots in
-    `places`, False for gaps and copies. rays: (m, 3) of the slots' points, NaN in gaps. strips: (m,) strip of each
-    slot, -1 in gaps; None for a mesh without strips.
+    `places`, False for gaps and points of the mesh's margin. rays: (m, 3) of the slots' points, NaN in gaps. strips:
+    (m,) strip of each slot, -1 in gaps; None for a mesh without strips.
     """
 
     slots: Indices
@@ -56,18 +54,11 @@ class Layout(ABC):
         strips = 0 if self.strips is None else self.strips.nbytes
         return self.slots.nbytes + self.places.nbytes + self.original.nbytes + self.rays.nbytes + strips
 
-    @abstractmethod
     def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
         """All outputs (m, outputs) for the slots, valid only on screen.
 
         colors (3, m): of the slots, as the network takes them. on_screen (m,): which slots are on screen.
         """
-
-
-class WholeLayout(Layout):
-    """A layout that the network takes in one call."""
-
-    def answers(self, network: Run, colors: Singles, on_screen: Mask) -> Singles:
         return self.probabilities(network(self.feeds(colors, on_screen)))
 
     @abstractmethod

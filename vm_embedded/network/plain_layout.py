@@ -7,11 +7,11 @@ import numpy.typing as npt
 
 from ..arrays import Indices, Mask, Singles, frozen
 from ..mesh.mesh import Mesh
-from .layout import OFF_SCREEN, Feeds, WholeLayout
+from .layout import OFF_SCREEN, Feeds, Layout
 
 
-class PlainLayout(WholeLayout):
-    """Slot i is point i, without gaps or copies. The off-screen point is the last row of every input.
+class PlainLayout(Layout):
+    """Slot i is point i, without gaps. The off-screen point is the last row of every input.
 
     edge: the policy for a neighbor that is off screen. Policy "hard" puts the off-screen point in its place, "same" the
     point itself.

@@ -1,7 +1,4 @@
-"""The places that patches are cut at: proposals of the mesh network, places beside true objects, and random places.
-
-With a glance, the proposals are those that it passes on, at the centers that it found.
-"""
+"""The places that patches are cut at: peaks of the mesh network, places beside true objects, and random places."""
 
 from __future__ import annotations
 
@@ -10,14 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Image, Singles
-from vm_embedded.detection.looking import Look, worth_of
+from vm_embedded.arrays import Floats, Image
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
+from vm_embedded.detection.peaks import Peaks
 from vm_embedded.detection.prepared_view import PreparedView
-from vm_embedded.detection.proposals import propose
 
-from ..evaluation.answers import passed_on
 from .configuration import PatchSettings
 from .labels import VISIBLE, Truths
 
@@ -59,22 +54,9 @@ class Places:
         return cut_patches(observation.pyramid, nodes, settings.size)
 
 
-def proposed_places(
-    observation: Observation,
-    class_name: str,
-    probabilities: Singles,
-    settings: PatchSettings,
-    glance: Look | None,
-    share: float,
-) -> Places:
-    """The proposals of a class from the slots' probabilities (m,), best first.
-
-    share: of the probability above which the glance passes a proposal on. Raises ModelError if the glance does not run.
-    """
-    centers, _ = propose(observation, class_name, probabilities, settings.above, settings.proposals)
-    if glance is not None:
-        centers = passed_on(observation, centers, glance, share * worth_of(glance.contract))
-    return Places.of(centers)
+def proposed_places(view: PreparedView, peaks: Peaks, settings: PatchSettings) -> Places:
+    """The peaks that a look judges, best first."""
+    return Places.of(view.shape.center_along(peaks.rays[: settings.max_proposals], view.height))
 
 
 def jittered_places(view: PreparedView, truths: Truths, settings: PatchSettings, random: np.random.Generator) -> Places:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
-from vm_embedded.detection.looking import Look, chain_of, look_at
+from vm_embedded.detection.looking import Look, look_at
 from vm_embedded.detection.peaks import LARGEST_SIZE
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
@@ -40,9 +40,8 @@ def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, abo
     size: of the frame [px]. radii (s,): to look for [px]. above: lowest probability of a candidate. most: number of
     candidates. Of candidates that overlap, the better one stays. Raises ModelError if the network does not run.
     """
-    first = chain_of(look)[0]
     windows = grid_windows(size, radii)
-    answers = first.run(windows.cut(pyramid, first.contract)).astype(np.float64)
+    answers = look.run(windows.cut(pyramid, look.contract)).astype(np.float64)
     likely = np.flatnonzero((answers[:, 0] > above) & (np.abs(answers[:, 3]) < _UNLIKE))
     likely = likely[np.argsort(-answers[likely, 0], kind="stable")]
     found = windows.part(likely).moved(answers[likely, 1], answers[likely, 2])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tests.manifests import MESHES, ball_manifest
+from tests.manifests import ball_manifest
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
@@ -13,18 +13,19 @@ from vm_embedded.errors import GeometryError
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.manifest import LAYOUTS
 
 from ..strategies import SIZE, lenses, orientations, random_direction, reals, rotation, seeds
 
 LENS = Equisolid(focal_length=300.0, fov=2.2)
 
-in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
+MESHES = ("ring6", "octaves")
+"""One on a graph and one on a canvas."""
+
+in_all_layouts = pytest.mark.parametrize("mesh", MESHES)
 
 
 def manifest(**changes):
-    mesh = MESHES[changes.get("layout", "plain")]
-    return ball_manifest(**{"intersections": 2.0, "mesh": mesh, "max_distance": 3.0} | changes)
+    return ball_manifest(**{"intersections": 2.0, "max_distance": 3.0} | changes)
 
 
 def built(cache, height):
@@ -79,8 +80,8 @@ AHEAD = (Settings(), 0.8, 0.0, 0.4)
 @given(buckets(), lenses(), seeds)
 @example(AHEAD, Equisolid(focal_length=100.0, fov=2.0 * math.pi), 0)
 @example(AHEAD, Equidistant(focal_length=60.0, fov=2.0 * math.pi), 0)
-def test_a_bucket_never_changes_an_answer(layout, bucket, lens, seed):
-    cache = MeshCache(manifest(layout=layout), bucket[0])
+def test_a_bucket_never_changes_an_answer(mesh, bucket, lens, seed):
+    cache = MeshCache(manifest(mesh=mesh), bucket[0])
     random = np.random.default_rng(seed)
     for _ in range(6):
         assert_same_as_without(cache, within(bucket, random), lens, SIZE)
@@ -93,9 +94,9 @@ BROAD = (Settings(roll_step=0.5, pitch_step=0.5), 1.0, 0.0, 0.0)
 @in_all_layouts
 @given(buckets(), lenses(), seeds)
 @example(BROAD, Equisolid(focal_length=127.0, fov=1.0, distortion=(-1e-6, 0.0)), 0)
-def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, bucket, lens, seed):
+def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(mesh, bucket, lens, seed):
     """Matrices from files are rotations to some digits only; those that Orientation accepts are answered alike."""
-    cache = MeshCache(manifest(layout=layout), bucket[0])
+    cache = MeshCache(manifest(mesh=mesh), bucket[0])
     random = np.random.default_rng(seed)
     for _ in range(6):
         exact = within(bucket, random)
@@ -106,8 +107,8 @@ def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, b
 @in_all_layouts
 @pytest.mark.parametrize("stretch", [1.0 - 4.9e-4, 1.0 + 4.9e-4])
 @pytest.mark.parametrize("fov", [0.2, 0.8, 1.6])
-def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch, layout):
-    fine = manifest(intersections=20.0, max_distance=1.5, layout=layout)
+def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch, mesh):
+    fine = manifest(intersections=20.0, max_distance=1.5, mesh=mesh)
     cache = MeshCache(fine, Settings(pitch_step=1e-3, roll_step=1e-3))
     for pitch in (0.8, 1.0, 1.2):
         stretched = Orientation(0.8, stretch * Orientation.from_roll_pitch(0.8, pitch=pitch).rotation)
@@ -147,8 +148,8 @@ def test_heights_share_few_meshes(tolerance, seed):
 
 @in_all_layouts
 @given(orientations(0.3, 1.5))
-def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layout, orientation):
-    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=0.0))
+def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(mesh, orientation):
+    cache = MeshCache(manifest(mesh=mesh), Settings(height_tolerance=0.0))
     view = cache.view(orientation, LENS, SIZE)
     assert cache.mesh_height(orientation.height) == orientation.height
     np.testing.assert_array_equal(view.rotation, orientation.rotation)
@@ -158,8 +159,8 @@ def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layou
 
 @in_all_layouts
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
-def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, layout):
-    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=tolerance))
+def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, mesh):
+    cache = MeshCache(manifest(mesh=mesh), Settings(height_tolerance=tolerance))
     lens = Rectilinear(focal_length=600.0, fov=1.2)
     view = cache.view(Orientation.from_roll_pitch(0.8, pitch=-1.2), lens, SIZE)
     assert len(view.layout.places) == 0
@@ -191,15 +192,15 @@ def test_hits_and_misses_are_counted():
 
 
 @in_all_layouts
-def test_a_hit_gives_the_same_layout(layout):
-    cache = MeshCache(manifest(layout=layout), Settings())
+def test_a_hit_gives_the_same_layout(mesh):
+    cache = MeshCache(manifest(mesh=mesh), Settings())
     ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
     assert cache.view(ahead, LENS, SIZE).layout is cache.view(ahead, LENS, SIZE).layout
 
 
 @in_all_layouts
-def test_nbytes_is_what_is_held(layout):
-    cache = MeshCache(manifest(layout=layout), Settings())
+def test_nbytes_is_what_is_held(mesh):
+    cache = MeshCache(manifest(mesh=mesh), Settings())
     first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
     whole = built(cache, cache.mesh_height(0.8))
     one = first.layout.nbytes + first.levels.nbytes
@@ -226,9 +227,9 @@ def test_the_least_recently_used_mesh_goes_first():
 
 @in_all_layouts
 @given(st.lists(st.integers(0, 5), min_size=1, max_size=20), reals(0.0, 0.6))
-def test_the_memory_limit_is_obeyed_and_changes_no_answer(layout, order, cache_mib):
-    cache = MeshCache(manifest(layout=layout), Settings(cache_mib=cache_mib))
-    free = MeshCache(manifest(layout=layout), Settings())
+def test_the_memory_limit_is_obeyed_and_changes_no_answer(mesh, order, cache_mib):
+    cache = MeshCache(manifest(mesh=mesh), Settings(cache_mib=cache_mib))
+    free = MeshCache(manifest(mesh=mesh), Settings())
     for index in order:
         orientation = Orientation.from_roll_pitch(0.5 + 0.1 * (index % 3), pitch=0.3 + 0.2 * index)
         limited, unlimited = (each.view(orientation, LENS, SIZE) for each in (cache, free))
@@ -253,8 +254,8 @@ def test_without_memory_nothing_is_held():
 def test_a_camera_that_wanders_is_answered_right(seed):
     """Through many buckets with one cache, straight down and upside down included."""
     random = np.random.default_rng(seed)
-    layout = LAYOUTS[seed % len(LAYOUTS)]
-    cache = MeshCache(manifest(max_distance=2.0, layout=layout), Settings(cache_mib=2.0))
+    mesh = MESHES[seed % len(MESHES)]
+    cache = MeshCache(manifest(max_distance=2.0, mesh=mesh), Settings(cache_mib=2.0))
     matrix = Orientation.from_roll_pitch(1.0, pitch=1.5).rotation
     for _ in range(5):
         matrix = matrix @ rotation(0.4 * random_direction(random))

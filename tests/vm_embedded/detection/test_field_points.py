@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, Orientation, Settings, read_lens_file
 from vm_embedded.cameras.image_files import read_image
-from vm_embedded.detection.field_points import _pixels, ground_points, locate_features
+from vm_embedded.detection.field_points import ground_points, locate_features
 from vm_embedded.detection.observation import Observation
 from vm_embedded.network.manifest import ObjectClass
 
@@ -58,7 +58,7 @@ def test_places_on_the_plane_have_the_pixels_of_their_points(detector, yaw, roll
     seen = painted(detector, Orientation.from_roll_pitch(0.8, roll, pitch, yaw))
     points = ground_points(seen)
     assert (np.diff(points.ranges) > -1e-6).all()
-    pixels = _pixels(seen.view, points.positions)
+    pixels = seen.view.picture_pixels(points.positions)
     order = np.argsort(seen.rays[:, 2], kind="stable")[: len(pixels)]
     shown = np.isfinite(pixels).all(axis=1)
     assert shown.mean() > 0.99  # points beside the edge may round to its other side

@@ -74,7 +74,7 @@ def lowest_of(scene):
 
 def objects_in(scene, probability, **settings):
     answered = replace(scene, slot_answers=probability[:, None])
-    return locate(answered, None, Settings(**settings), Stopwatch(), explain=True)
+    return locate(answered, {}, Settings(**settings), Stopwatch(), explain=True)
 
 
 @given(distance=st.floats(0.6, 6.0), heading=st.floats(-0.4, 0.4), height=st.floats(0.5, 1.3))
@@ -183,7 +183,7 @@ def test_noise_never_breaks_the_search(seed, share):
 def test_reasons_are_only_collected_when_asked_for():
     scene = scene_at()
     observation = replace(scene, slot_answers=ideal(scene, (1.3, 0.0), radius=0.3)[:, None])
-    _, rejected = locate(observation, None, Settings(), Stopwatch())
+    _, rejected = locate(observation, {}, Settings(), Stopwatch())
     assert rejected == ()
 
 

@@ -21,7 +21,7 @@ from vm_embedded.network.choose_layout import choose_layout
 from ..strategies import SIZE, reals, seeds
 
 MANIFEST = ball_manifest(
-    "ball", "line", "other", mesh="octaves", layout="canvas", sampling="footprint", intersections=1.5, max_distance=4.0
+    "ball", "line", "other", mesh="octaves", sampling="footprint", intersections=1.5, max_distance=4.0
 )
 MESH = build_mesh(Sphere(0.1), 0.7, 1.5, 4.0, "octaves")
 STEPS = mesh_model("octaves").steps

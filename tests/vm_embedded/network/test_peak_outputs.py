@@ -18,9 +18,7 @@ from vm_embedded.network.session import Session
 
 from ..strategies import SIZE
 
-MANIFEST = ball_manifest(
-    "ball", "goal:upright", "other", mesh="octaves", layout="canvas", max_distance=4.0, peaks=("goal", "ball")
-)
+MANIFEST = ball_manifest("ball", "goal:upright", "other", mesh="octaves", max_distance=4.0, peaks=("goal", "ball"))
 LENS = Equisolid(focal_length=220.0, fov=2.6)
 KERNEL = np.zeros((MANIFEST.outputs, 4))
 """Red is the score of balls, green that of posts, and blue their size. Nothing is shifted."""
@@ -94,7 +92,7 @@ def test_peaks_are_where_the_picture_shows_something():
     seen = detector.observe(image, Orientation.from_roll_pitch(0.6, 0.05, 0.5, 1.0), LENS)
     assert seen.probabilities.shape == (len(seen), 3)
     for name, pixel in spots.items():
-        found = seen.find_peaks(name, 5)
+        found = seen.peaks[name].part(slice(5))
         assert len(found) == 1
         np.testing.assert_allclose(seen.view.ray_pixels(found.rays), [pixel], atol=8.0)
         np.testing.assert_allclose(found.log_sizes, 0.4, atol=0.01)

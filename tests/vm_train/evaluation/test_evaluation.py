@@ -45,12 +45,9 @@ def files(drawn):
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """The drawn frames' network as a checkpoint and as a model file of each layout."""
-    folder = tmp_path_factory.mktemp("models")
-    paths = {"pt": CHECKPOINT}
-    for layout in ("plain", "runs"):
-        paths[layout] = folder / f"{layout}.onnx"
-        export(Checkpoint.load(CHECKPOINT), paths[layout], layout)
+    """The drawn frames' network as a checkpoint and as a model file."""
+    paths = {"pt": CHECKPOINT, "onnx": tmp_path_factory.mktemp("models") / "model.onnx"}
+    export(Checkpoint.load(CHECKPOINT), paths["onnx"])
     return {name: load_subject(path, SETTINGS) for name, path in paths.items()}
 
 
@@ -90,10 +87,10 @@ def test_scores_of_checkpoints_and_model_files_agree(models, files):
 
 
 def test_the_drawn_balls_are_found_where_they_are(models):
-    result = Evaluation.empty(models["runs"])
+    result = Evaluation.empty(models["onnx"])
     files = find_pictures(FOLDER)
     for each, (picture, scene) in zip(files, drawn_pictures(), strict=True):
-        result.count(each, picture, scene, models["runs"].answer(picture), MANIFEST)
+        result.count(each, picture, scene, models["onnx"].answer(picture), MANIFEST)
     ranking = result.objects["ball"].ranking(0.5)
     assert ranking.at().hits == 6
     assert ranking.errors().distance_median < 0.06

@@ -30,8 +30,8 @@ def begin(drawn, tiny, tmp_path):
     def begin_one(name="run", data=drawn, strict=False, changes=None):
         split = split_by_seed([each.number for each in find_pictures(data)], 0.25, 0.0, 0)
         configuration = read_sections(LookConfiguration, tiny, changes)
-        model = model_path("ball-small")
-        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-small", strict=strict)
+        model = model_path("ball")
+        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball", strict=strict)
 
     return begin_one
 

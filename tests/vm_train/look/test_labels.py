@@ -104,7 +104,7 @@ def test_truth_from_a_mask_is_near_that_of_the_scene(drawn, tmp_path):
     """The mask's ball is smaller where the picture ends."""
     (tmp_path / "look.toml").write_text(CLASSES)
     table = read_sections(LookConfiguration, tmp_path / "look.toml").classes
-    subject = load_subject(model_path("ball-small"), Settings())
+    subject = load_subject(model_path("ball"), Settings())
     compared = 0
     for files in find_pictures(drawn):
         picture, scene = read_picture(files, table.mask_classes()), read_scene(drawn / f"scene{files.number}.json")

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.vm_embedded.detection import test_looking
 from tests.vm_embedded.detection.views import BALL, center_at, observation_of, view_at
 from vm_embedded.detection.patches import Tangents
 from vm_train.look.configuration import PatchSettings
@@ -52,9 +53,9 @@ def test_random_places_are_in_the_picture_and_on_the_mesh(seed):
 
 
 def test_proposals_are_at_the_balls():
-    observation = observation_of(VIEW, NEAR, FAR)
-    found = proposed_places(observation, "ball", observation.slot_probabilities[:, 0], PatchSettings(), None, 0.0)
-    labels = label_places(found.tangents(VIEW), truths(NEAR, FAR))
+    observation = test_looking.observed(NEAR, FAR)
+    found = proposed_places(observation.view, observation.peaks["ball"], PatchSettings())
+    labels = label_places(found.tangents(test_looking.VIEW), truths(NEAR, FAR))
     assert set(labels.of) >= {0, 1}
 
 

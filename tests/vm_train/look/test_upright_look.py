@@ -7,12 +7,11 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.vm_export.looks import look_checkpoint
 from tests.vm_train.commands import run, run_module
 from tests.vm_train.fields import CLASSES, STANDING, picture, write_pictures
 from vm_embedded import Detector, read_lens_file
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.upright_looks import around_bases
+from vm_embedded.detection.upright_bases import around_bases
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_export.look_checkpoint import LookCheckpoint
@@ -103,31 +102,19 @@ def field(tmp_path_factory):
 @pytest.mark.parametrize("name", ["goal", "robot"])
 def test_a_trained_look_goes_into_a_model_file_and_runs_there(field, tiny, tmp_path, name):
     given = ["--from", "soccer", "--config", tiny, "--set", f"patches.object_class={name}", "--workers", 1]
-    given += ["--set", "patches.proposals=24", "--set", "patches.upright_radius=0.5"]
+    given += ["--set", "patches.max_proposals=24", "--set", "patches.upright_radius=0.5"]
     lines = run("look", field, "-o", tmp_path / "run", *given).stdout.splitlines()
     assert re.fullmatch(rf"training: \d+ patches, \d+ of them show the object {name}", lines[1])
     contract = LookCheckpoint.load(tmp_path / "run" / "look.pt").contract
     assert (contract.object_class, contract.upright_radius) == (name, 0.5)
     run_module("vm_export.cli", *lines[-1].removeprefix("next: vm-export ").split())
     detector = Detector.from_file(tmp_path / "run" / "model.onnx")
-    radii = {key: look.contract.upright_radius for key, look in detector.upright_looks.items()}
-    assert radii == {"goal": 0.4, "robot": 0.4} | {name: 0.5}  # the other one is that of soccer
+    radii = {key: look.contract.upright_radius for key, look in detector.looks.items()}
+    assert radii == {"ball": 0.0, "goal": 0.4, "robot": 0.4} | {name: 0.5}  # the others are those of soccer
     lens = read_lens_file(field / "lens0.yaml")
     found = detector.detect(cv2.imread(str(field / "image0.jpg")), lens.orientation, lens.lens)
     assert found.field is not None
     assert all(np.isfinite(each.position).all() for each in (*found.field.posts, *found.field.robots))
-
-
-def test_a_glance_has_the_same_class_and_radius_as_its_look(field, tiny, tmp_path):
-    glance = tmp_path / "glance.pt"
-    for object_class, radius, complaint in (
-        ("robot", 0.3, "judges class 'robot', not 'goal'"),
-        ("goal", 0.5, "give both the same one"),
-    ):
-        look_checkpoint(object_class=object_class, upright_radius=radius).save(glance)
-        given = ["--from", "soccer", "--config", tiny, "--set", "patches.object_class=goal", "--glance", glance]
-        assert complaint in run("look", field, "-o", tmp_path / "run", *given, code=1).stderr
-    assert not (tmp_path / "run" / "look.toml").exists()
 
 
 def test_classes_that_nobody_can_look_at_are_refused(field, tiny, tmp_path):

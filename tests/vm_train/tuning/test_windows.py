@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.looks import look_contract
 from vm_embedded.detection.looking import look_at
 from vm_embedded.detection.pyramid import Pyramid
-from vm_embedded.network.look_contract import LookContract
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED
 from vm_train.tuning.candidates import find_candidates, search_radii, seen_objects
 from vm_train.tuning.windows import WindowPlaces, Windows, grid_windows, jittered_windows, random_windows
 
-CONTRACT = LookContract(object_class="ball", size=16, extent=2.0, above=0.03, passes=1)
+CONTRACT = look_contract(size=16, extent=2.0)
 
 
 def windows(*rows):
@@ -23,9 +23,8 @@ def windows(*rows):
 class Bright:
     """Judges a patch by its bright pixels, as a look network would: probability, shift and size."""
 
-    def __init__(self, passes=1, glance=None):
-        self.glance = glance
-        self.contract = LookContract(object_class="ball", size=32, extent=2.0, above=0.03, passes=passes)
+    def __init__(self, passes=1):
+        self.contract = look_contract(size=32, extent=2.0, passes=passes)
 
     def run(self, patches):
         bright = patches[..., 0] > 128
@@ -135,30 +134,6 @@ def test_an_object_has_the_size_that_the_network_sees(radius):
     pyramid = disks((80.0, 60.0, radius))
     seen, _ = seen_objects(pyramid, (200, 150), Bright(passes=2), np.array([10.0]), 0.1, 10)
     assert seen.radii == pytest.approx([radius], rel=0.06)
-
-
-def test_the_first_of_all_glances_finds_the_candidates():
-    class Blind(Bright):
-        def run(self, patches):
-            raise AssertionError("only the first glance looks everywhere")
-
-    chain = Blind(glance=Blind(glance=Bright()))
-    assert len(find_candidates(disks((40.3, 60.0, 10.0)), (200, 150), chain, np.array([10.0]), 0.1, 10)) == 1
-
-
-def test_windows_tell_how_large_their_objects_are():
-    places = WindowPlaces(disks(), windows((44.0, 60.0, 10.0), (50.0, 20.0, 30.0)))
-    assert places.radii(np.array([1, 0])).tolist() == [30.0, 10.0]
-
-
-def test_windows_are_near_if_place_and_size_agree():
-    places = WindowPlaces(
-        disks(), windows((44.0, 60.0, 10.0), (46.0, 60.0, 10.0), (44.0, 64.0, 10.0), (44.0, 60.0, 12.0))
-    )
-    near = np.eye(4, dtype=bool)
-    near[0, 1] = near[1, 0] = True
-    assert places.near(np.arange(4)).tolist() == near.tolist()
-    assert places.near(np.array([1, 3])).tolist() == np.eye(2, dtype=bool).tolist()
 
 
 def test_a_look_leaves_the_windows_that_it_was_given_as_they_are():

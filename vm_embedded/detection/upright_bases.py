@@ -1,0 +1,62 @@
+"""Goal posts and robots, at the peaks of their classes: each is where it stands on the plane.
+
+A close look at objects serves here, too. The object is a circle on the plane, around the base of the upright. So a
+patch shows the base in its middle, the ground around it, and the lower part of the upright.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..field.features import UPRIGHTS, Upright
+from ..geometry.circle import Circle
+from .looking import Look, judge_peaks
+from .observation import Observation
+from .peaks import first_apart
+from .settings import Settings
+from .stopwatch import Stopwatch
+
+_SAME = 0.12
+"""Two bases nearer to each other than this share of their distance are those of one thing: far away, a small error in
+the picture is a large one on the plane."""
+
+
+def around_bases(observation: Observation, radius: float) -> Observation:
+    """The same points, where circles on the plane with this radius [m] are sought: one around each base."""
+    return replace(observation, view=observation.view._replace(shape=Circle(radius)))
+
+
+def find_uprights(
+    observation: Observation, class_name: str, look: Look | None, settings: Settings
+) -> tuple[Upright, ...]:
+    """The uprights of a class that the network has peaks for, nearest first.
+
+    look: the look network for the class, if there is one. Raises ModelError if it does not run.
+    """
+    view = observation.view
+    radius = observation.manifest.radius if look is None else look.contract.upright_radius
+    circles = around_bases(observation, radius)
+    peaks = observation.peaks[class_name].apart(circles.view)
+    judged = judge_peaks(circles, peaks, look, settings, Stopwatch())
+    centers = np.array([each.center for each in judged]).reshape(-1, 3) @ view.heading.T
+    widths = [2.0 * radius * each.scale for each in judged]
+    pixels = view.picture_pixels(centers[:, :2])
+    found = []
+    for center, width, pixel, each in zip(centers, widths, pixels, judged, strict=True):
+        distance = float(np.linalg.norm(center))
+        found.append(
+            Upright(UPRIGHTS[class_name], each.confidence, center[:2], distance, center / distance, pixel, width)
+        )
+    return apart(found)
+
+
+def apart(uprights: Sequence[Upright]) -> tuple[Upright, ...]:
+    """Uprights without those that are there already, nearest first. uprights: most probable first."""
+    places = np.array([each.position for each in uprights]).reshape(-1, 2)
+    ranges = np.hypot(*places.T)
+    reach = np.maximum(_SAME * ranges, 0.5 * np.array([each.width for each in uprights]))
+    kept = first_apart(np.hypot(*(places[:, None] - places).T) < reach[:, None])
+    return tuple(uprights[number] for number in kept[np.argsort(ranges[kept], kind="stable")])
