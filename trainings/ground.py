@@ -7,7 +7,9 @@ from pathlib import Path
 
 BASE = "vm_embedded.base"
 MOVES = {f"vm_embedded.{name}": f"{BASE}.{name}" for name in ("arrays", "errors", "files")}
-MOVES |= {f"vm_embedded.borders.{each.stem}": f"{BASE}.{each.stem}" for each in Path("vm_embedded/borders").glob("[a-z]*.py")}
+MOVES |= {
+    f"vm_embedded.borders.{each.stem}": f"{BASE}.{each.stem}" for each in Path("vm_embedded/borders").glob("[a-z]*.py")
+}
 MOVES |= {f"vm_embedded.cli.{name}": f"{BASE}.{name}" for name in ("program", "progress", "terminal")}
 MOVES |= {"vm_embedded.live.http_server": f"{BASE}.http_server"}
 INIT = '"""What all layers share: errors, array types, files, text, sockets, and what every program does."""\n'
@@ -160,13 +162,26 @@ edit(
     ("| room | contents |", "| layer | contents |"),
     ("**The room `field`", "**The layer `field`"),
 )
-for each in git("grep", "-l", "the-rooms-of-the-code").splitlines() if subprocess.run(["git", "grep", "-q", "the-rooms-of-the-code"]).returncode == 0 else []:
+for each in (
+    git("grep", "-l", "the-rooms-of-the-code").splitlines()
+    if subprocess.run(["git", "grep", "-q", "the-rooms-of-the-code"]).returncode == 0
+    else []
+):
     edit(each, ("the-rooms-of-the-code", "the-layers-of-the-code"))
 edit(
     "docs/design.md",
-    ("A room is a folder of modules. A room imports only from the rooms below it", "A layer is a folder of modules. A layer imports only from the layers below it"),
+    (
+        "A room is a folder of modules. A room imports only from the rooms below it",
+        "A layer is a folder of modules. A layer imports only from the layers below it",
+    ),
     ("Packages without a table have no rooms.", "Packages without a table have no layers."),
 )
-edit("tests/vm_embedded/cli/test_program.py", ("program; print(program(lambda: os.open('/', os.O_RDONLY))())", "program; print(program(lambda: os.open('/', 0))())"))
+edit(
+    "tests/vm_embedded/cli/test_program.py",
+    (
+        "program; print(program(lambda: os.open('/', os.O_RDONLY))())",
+        "program; print(program(lambda: os.open('/', 0))())",
+    ),
+)
 edit("vm_embedded/base/program.py", ("# Rooms do not import", "# Layers do not import"))
 git("add", "-A")

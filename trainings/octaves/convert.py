@@ -4,6 +4,7 @@
 
 --max-proposals: of a look (10 without it). Weights stay as they are. A look with a glance loses the glance.
 """
+
 import argparse
 import torch
 
