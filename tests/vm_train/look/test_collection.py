@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.other_model import OTHER
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
@@ -143,7 +144,7 @@ def test_files_that_were_changed_since_the_beginning_are_refused(begin):
     run = begin()
     assert kind_of(run.folder) == "look"
     mesh, toml = run.mesh.read_bytes(), (run.folder / "look.toml").read_text()
-    run.mesh.write_bytes(Path(model_path("ball")).read_bytes())
+    run.mesh.write_bytes(OTHER.read_bytes())
     with pytest.raises(InputError, match=r"mesh\.onnx was changed"):
         read_look_run(run.folder)
     run.mesh.write_bytes(mesh)
