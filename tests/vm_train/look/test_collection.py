@@ -1,7 +1,5 @@
 """Patches are the same whoever collects them, and whatever interrupts it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
