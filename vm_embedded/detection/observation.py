@@ -13,7 +13,7 @@ from ..arrays import Floats, Indices, Mask, Singles
 from ..network.canvas_layout import CanvasLayout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
-from .color_normalization import normalized
+from .color_normalization import normalized, normalized_canvas
 from .peaks import Peaks, peaks_of
 from .prepared_view import PreparedView
 from .projection import Projection, project
@@ -117,10 +117,10 @@ def classify(
     # The network needs the colors of copies, too. They must not count twice in the mean color, nor in an object.
     shown = projected.only(layout.original)
     if isinstance(layout, CanvasLayout):
-        sampled = sample_strips(pyramid, projected.pixels, view.levels, layout)
+        canvas = sample_strips(pyramid, projected.pixels, view.levels, layout, projected.on_screen)
+        colors = normalized_canvas(canvas, pyramid.channels, manifest.colors, shown.on_screen)
     else:
-        sampled = sample(pyramid, projected.pixels, view.levels)
-    colors = normalized(sampled, manifest.colors, shown.on_screen)
+        colors = normalized(sample(pyramid, projected.pixels, view.levels), manifest.colors, shown.on_screen)
     watch.lap("sample")
     answers = network.run(layout, colors, projected.on_screen)
     watch.lap("infer")
