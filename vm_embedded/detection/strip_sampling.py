@@ -17,22 +17,20 @@ from .pyramid import Pyramid
 
 
 def sample_strips(pyramid: Pyramid, pixels: Floats, levels: Levels, layout: CanvasLayout) -> Singles:
-    """Red, green and blue (3, m), from 0 to 1, at pixels (m, 2) of the frame, one for each slot of a canvas.
+    """Red, green and blue (3, m), from 0 to 1, of the cells of a canvas, from pixels (n, 2) of the mesh's points.
 
-    levels: which picture of the pyramid colors each slot. The color is arbitrary where a pixel is outside of the image.
+    levels: which picture of the pyramid colors each point. The color is arbitrary in cells without a point, and where a
+    pixel is outside of the image.
     """
     frame = pyramid.level(0)
     canvas = np.zeros((*layout.shape, *frame.shape[2:]), dtype=np.uint8)
-    places = pixels.reshape(*layout.shape, 2)
-    halvings = levels.halvings.reshape(layout.shape)
+    with np.errstate(over="ignore"):
+        factors = np.exp2(-levels.halvings, dtype=np.float32)
+        places = (pixels.T.astype(np.float32) + np.float32(0.5)) * factors  # pixels count from the middle of the first
+        places -= np.float32(0.5)
+    x, y = (layout.spread(each).reshape(layout.shape) for each in places)
     for piece in layout.pieces:
-        level = int(halvings[piece.region].max())
-        with np.errstate(over="ignore"):
-            at = places[piece.region].astype(np.float32)
-        at += 0.5  # pixels count from the middle of the first one
-        at *= 0.5**level
-        at -= 0.5
-        colors = cv2.remap(pyramid.level(level), at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
-        canvas[piece.region] = colors
+        picture, at = pyramid.level(int(levels.halvings[piece.point])), piece.region
+        canvas[at] = cv2.remap(picture, x[at], y[at], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     planes = np.asarray(cv2.dnn.blobFromImage(canvas, 1.0 / 255.0), dtype=np.float32)  # one for each channel
-    return planes.reshape(-1, len(pixels))[list(pyramid.channels)]
+    return planes.reshape(len(planes[0]), -1)[list(pyramid.channels)]
