@@ -82,8 +82,8 @@ class MeshCache:
         if self.settings.height_tolerance == 0.0:
             # As in the reference: a mesh for each exact height, no buckets, and no turn of the mesh with the yaw.
             mesh = self._look_up(height, lambda: self._build(height))
-            part = mesh.part(np.flatnonzero(may_be_on_screen(mesh, orientation.rotation, lens, size, _ROUNDING)))
-            points, rotation, heading = self._prepared(part, height, lens), orientation.rotation, np.eye(3)
+            possible = may_be_on_screen(mesh, orientation.rotation, lens, size, _ROUNDING)
+            points, rotation, heading = self._prepared(mesh, possible, height, lens), orientation.rotation, np.eye(3)
         else:
             pitch = round(orientation.pitch / self.settings.pitch_step)
             roll = round(orientation.roll / self.settings.roll_step)
@@ -164,11 +164,11 @@ class MeshCache:
 
         part = mesh.part(np.flatnonzero(possible(mesh, 0.0, 0.0, 0.5)))
         quarters = [possible(part, pitched, rolled, 0.25) for pitched in (-0.25, 0.25) for rolled in (-0.25, 0.25)]
-        return self._prepared(part.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens)
+        return self._prepared(part, np.any(quarters, axis=0), height, lens)
 
-    def _prepared(self, part: Mesh, height: float, lens: Lens) -> PreparedPoints:
-        """The points of a part of a mesh that the network needs, with its layout and the levels of their colors."""
-        mesh = part.part(np.flatnonzero(part.needed))
+    def _prepared(self, mesh: Mesh, possible: Mask, height: float, lens: Lens) -> PreparedPoints:
+        """The points of a mesh that may be on screen (n,), as far as the network needs them."""
+        mesh = mesh.part(np.flatnonzero(mesh.needed(possible)))
         return PreparedPoints(mesh, choose_layout(mesh, self.manifest), levels_for(self.manifest, mesh, height, lens))
 
     def _look_up(self, key: Hashable, make: Callable[[], _Kept], counted: bool = True) -> _Kept:

@@ -53,10 +53,11 @@ def propose(observation: Observation, class_name: str, probabilities: Singles, s
     for cluster in clusters(mesh, numbers[probabilities > settings.threshold])[:_MOST_CLUSTERS]:
         center = _middle(observation.view, cluster)
         near = _around(observation.view, cluster, center, rays)
+        around = rays[near]
         p = probabilities[near].astype(np.float64)
         log_odds = np.log(np.maximum(p, 1e-12) / np.maximum(1.0 - p, 1e-12)).clip(-_MOST_LOG_ODDS, _MOST_LOG_ODDS)
-        reason = _wrong_size(observation.view, cluster, center, rays[near], settings)
-        candidates.append(Candidate(class_name, center, rays[near], p, log_odds, reason))
+        reason = _wrong_size(observation.view, cluster, center, around, settings)
+        candidates.append(Candidate(class_name, center, around, p, log_odds, reason))
     return candidates
 
 

@@ -49,7 +49,7 @@ def ground_points(observation: Observation) -> GroundPoints:
     upward = rays[2]
     order = np.argsort(upward, kind="stable")  # the mesh is nearly in this order
     order = order[: np.searchsorted(upward, -_LOWEST, sorter=order)]
-    positions = rays[:2, order] * (-view.height / upward[order])
+    positions = np.take(rays[:2], order, axis=1) * (-view.height / upward[order])
     columns = [  # 0 for NaN: one NaN would spoil the sums of all others
         (each, np.fmax(column[order], 0.0))
         for each, column in zip(classes, observation.probabilities.T, strict=True)

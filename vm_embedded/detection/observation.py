@@ -35,9 +35,9 @@ class Network(Protocol):
 class Observation:
     """A frame's n points on screen with their probabilities, before objects are located among them.
 
-    All are in the order of the mesh. pyramid: the frame. view: its mesh, lens and orientation. manifest: of the network.
-    projected: the view's mesh in the picture; the n points are `Projection.answered`. answers (n, outputs): the
-    network's outputs, as `Manifest.outputs` counts them. timing_ms: time of each stage [ms].
+    All are in the order of the mesh. pyramid: the frame. view: its mesh, lens and orientation. manifest: of the
+    network. projected: the view's mesh in the picture; the n points are `Projection.answered`. answers (n, outputs):
+    the network's outputs, as `Manifest.outputs` counts them. timing_ms: time of each stage [ms].
     """
 
     pyramid: Pyramid
@@ -98,16 +98,14 @@ def classify(
     watch: Stopwatch,
 ) -> Observation:
     """Sample the frame at projected points, and let the network classify them. See `observe`."""
-    layout, points = view.layout, projected.answered
+    layout = view.layout
     if isinstance(layout, CanvasLayout):
         sampled = sample_strips(pyramid, projected.pixels, view.levels, layout)
     else:
         sampled = sample(pyramid, projected.pixels, view.levels)
     # Strips overlap in their margins, whose colors must not count twice in the mean.
-    margin = projected.graph.margin
-    counted = projected.on_screen if margin is None else projected.on_screen & ~margin
-    colors = normalized(sampled, manifest.colors, layout.spread(counted))
+    colors = normalized(sampled, manifest.colors, layout.spread(projected.core))
     watch.lap("sample")
-    answers = network.run(layout, colors, projected.on_screen, points)
+    answers = network.run(layout, colors, projected.on_screen, projected.answered)
     watch.lap("infer")
     return Observation(pyramid, view, manifest, projected, answers, watch.stages)

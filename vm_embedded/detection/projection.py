@@ -36,10 +36,14 @@ class Projection:
         return Projection(self.graph.part(kept), self.pixels[kept], self.on_screen[kept])
 
     @cached_property
+    def core(self) -> Mask:
+        """Which points (n,) are on screen and not in the margin of the mesh."""
+        return self.on_screen if self.graph.margin is None else self.on_screen & ~self.graph.margin
+
+    @cached_property
     def answered(self) -> Chosen:
-        """The points (k,) that are on screen and not in the margin of the mesh."""
-        margin = self.graph.margin
-        return np.flatnonzero(self.on_screen if margin is None else self.on_screen & ~margin)
+        """The points (k,) of the core."""
+        return np.flatnonzero(self.core)
 
     def only(self, chosen: Mask) -> Projection:
         """The same mesh; points outside of `chosen` (n,) count as off screen."""

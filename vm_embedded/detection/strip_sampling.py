@@ -25,12 +25,12 @@ def sample_strips(pyramid: Pyramid, pixels: Floats, levels: Levels, layout: Canv
     frame = pyramid.level(0)
     canvas = np.zeros((*layout.shape, *frame.shape[2:]), dtype=np.uint8)
     with np.errstate(over="ignore"):
-        factors = np.exp2(-levels.halvings, dtype=np.float32)
-        places = (pixels.T.astype(np.float32) + np.float32(0.5)) * factors  # pixels count from the middle of the first
-        places -= np.float32(0.5)
-    x, y = (layout.spread(each).reshape(layout.shape) for each in places)
+        places = [layout.spread(each).reshape(layout.shape) for each in pixels.T.astype(np.float32)]
     for piece in layout.pieces:
-        picture, at = pyramid.level(int(levels.halvings[piece.point])), piece.region
-        canvas[at] = cv2.remap(picture, x[at], y[at], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        level = int(levels.halvings[piece.point])
+        # Pixels count from the middle of the first one.
+        x, y = ((each[piece.region] + 0.5) * 0.5**level - 0.5 for each in places)
+        colors = cv2.remap(pyramid.level(level), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        canvas[piece.region] = colors
     planes = np.asarray(cv2.dnn.blobFromImage(canvas, 1.0 / 255.0), dtype=np.float32)  # one for each channel
     return planes.reshape(len(planes[0]), -1)[list(pyramid.channels)]

@@ -51,12 +51,12 @@ class Mesh:
         strips."""
         return None if self.cells is None else self.cells[:, 1] // np.int32(STRIDE)
 
-    @property
-    def needed(self) -> Mask:
-        """The points (n,) that a network needs: all but those of strips that lie in the margin as a whole."""
-        if self.strips is None or self.margin is None:
-            return np.ones(len(self), dtype=bool)
-        return np.asarray(np.bincount(self.strips, ~self.margin)[self.strips] > 0.0)
+    def needed(self, kept: Mask) -> Mask:
+        """The points of a part `kept` (n,) that a network needs: not those of a strip of which it has only margin."""
+        strips = self.strips
+        if strips is None or self.margin is None:
+            return kept
+        return kept & (np.bincount(strips, kept & ~self.margin) > 0.0)[strips]
 
     @property
     def nbytes(self) -> int:

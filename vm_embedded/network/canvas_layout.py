@@ -63,7 +63,7 @@ class CanvasLayout(Layout):
 
 
 def place_on_canvas(cells: Indices) -> tuple[tuple[Piece, ...], tuple[int, int], Chosen]:
-    """The pieces of a canvas for points with these cells (n, 2), its rows and columns, and the place (n,) of each point.
+    """The pieces of a canvas for points with these cells (n, 2), its rows and columns, and the places (n,) of these.
 
     A place is row * columns + column. The rows of a canvas count downwards, those of the cells upwards.
     """
