@@ -37,7 +37,7 @@ ARRAYS = ("points", "neighbors", "labels", "distances", "pixels", "cells")
 
 
 def manifest(**changes):
-    entries = {"intersections": 3.0, "mesh": "octaves", "layout": "canvas", "max_distance": 6.0} | changes
+    entries = {"intersections": 3.0, "mesh": "octaves", "max_distance": 6.0} | changes
     return ball_manifest("ball", "other", **entries)
 
 
@@ -219,7 +219,7 @@ def test_views_that_are_kept_are_those_that_were_made(tmp_path):
     pictures = find_pictures(draw_set(tmp_path / "pictures", 2))
     recipe = GraphRecipe(
         TrainConfiguration().classes.mask_classes(),
-        replace(TrainConfiguration().manifest, mesh="octaves", layout="canvas", max_distance=4.0, colors="relative"),
+        replace(TrainConfiguration().manifest, mesh="octaves", max_distance=4.0, colors="relative"),
         augmentation=Augmentation(brightness=0.0, contrast=0.0, saturation=0.0, hue=0.0, gamma=0.0, noise=0.0),
     )
 
