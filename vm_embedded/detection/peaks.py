@@ -109,9 +109,10 @@ def _highest(score: Singles, numbers: Chosen, mesh: Mesh) -> tuple[Chosen, Chose
     """
     kinds, at = np.nonzero(score >= _LEAST)
     seen = np.full((len(score), len(mesh) + 1), -np.inf, dtype=np.float32)
-    seen[:, numbers] = score
-    around = seen[kinds[:, None], np.take(mesh.neighbors, numbers[at], axis=0)].max(axis=1, initial=-np.inf)
-    high = around <= score[kinds, at]
+    for row, own in zip(seen, score, strict=True):
+        row[numbers] = own
+    beside = np.take(mesh.neighbors, numbers[at], axis=0) + (kinds * len(mesh.neighbors))[:, None]
+    high = seen.take(beside.T).max(axis=0, initial=-np.inf) <= score[kinds, at]
     kinds, at = kinds[high], at[high]
     order = np.lexsort([-score[kinds, at], kinds])
     kinds, at = kinds[order], at[order]
