@@ -58,7 +58,7 @@ def _patch(manifest: Manifest) -> Mesh:
     mesh = manifest.model.build(manifest.mesh_shape, height, manifest.intersections, reach)
     kept = np.array([len(mesh) // 2])
     for _ in range(_HOPS):
-        kept = np.unique([*kept, *mesh.links(kept).ravel()])
+        kept = np.unique([*kept, *mesh.neighbors[kept].ravel()])
         kept = kept[kept < len(mesh)]
     return mesh.part(kept)
 

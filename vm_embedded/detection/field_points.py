@@ -45,15 +45,14 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
 def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
     view, classes = observation.view, observation.manifest.classes
-    rays = observation.layout.rays.T
-    upward = rays[2, observation.shown]
+    rays = observation.mesh_rays.T
+    upward = rays[2]
     order = np.argsort(upward, kind="stable")  # the mesh is nearly in this order
     order = order[: np.searchsorted(upward, -_LOWEST, sorter=order)]
-    slots, scale = observation.shown[order], -view.height / upward[order]
-    positions = np.array([rays[0, slots] * scale, rays[1, slots] * scale])
+    positions = np.take(rays[:2], order, axis=1) * (-view.height / upward[order])
     columns = [  # 0 for NaN: one NaN would spoil the sums of all others
-        (each, np.fmax(column[slots], 0.0))
-        for each, column in zip(classes, observation.slot_probabilities.T, strict=True)
+        (each, np.fmax(column[order], 0.0))
+        for each, column in zip(classes, observation.probabilities.T, strict=True)
         if each.kind == "background" or each.name in ROLES
     ]
     return GroundPoints(
@@ -62,7 +61,7 @@ def ground_points(observation: Observation) -> GroundPoints:
         across=view.shape.radius * view.ring_spacing,
         classes={each.name: column for each, column in columns if each.name in ROLES},
         outside=sum(
-            (column for each, column in columns if each.kind == "background"), np.zeros(len(slots), np.float32)
+            (column for each, column in columns if each.kind == "background"), np.zeros(len(order), np.float32)
         ),
         ahead=view.heading[:2, 0],
     )

@@ -43,7 +43,7 @@ def locate(
     """
     objects: list[Detection] = []
     rejected: list[Detection] = []
-    for object_class, probabilities in zip(observation.manifest.classes, observation.slot_probabilities.T, strict=True):
+    for object_class, probabilities in zip(observation.manifest.classes, observation.probabilities.T, strict=True):
         name = object_class.name
         if object_class.kind != "object":
             continue
@@ -76,7 +76,7 @@ def _candidates(
 def _describe_candidate(observation: Observation, candidate: Candidate) -> Detection:
     """The candidate as a detection: its confidence is the mean probability of the points inside its outline."""
     view = observation.view
-    offset = view.shape.offset(view.layout.rays[candidate.near], candidate.center[None], view.height)[0]
+    offset = view.shape.offset(candidate.rays, candidate.center[None], view.height)[0]
     inside = candidate.probabilities[offset < 1.0]
     scale = best_scale(view, candidate, offset)
     return _detection(
@@ -95,7 +95,7 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
 def _describe_judgment(observation: Observation, class_name: str, judgment: Judgment) -> Detection:
     """A peak or what a close look saw there, as a detection."""
     view = observation.view
-    covered = view.shape.covers(view.layout.rays, judgment.center[None], view.height)[0]
+    covered = view.shape.covers(observation.mesh_rays, judgment.center[None], view.height)[0]
     return _detection(
         observation,
         class_name,
@@ -103,7 +103,7 @@ def _describe_judgment(observation: Observation, class_name: str, judgment: Judg
         confidence=judgment.confidence,
         scale=judgment.scale,
         distances_agree=abs(judgment.scale - 1.0) <= _SAME_SIZE,
-        points=int(np.count_nonzero(covered & observation.projected.on_screen)),
+        points=int(np.count_nonzero(covered)),
         reason=judgment.reason,
     )
 
@@ -150,9 +150,7 @@ def _detection(
 
 def _nearest_pixel(observation: Observation, direction: Floats) -> Floats:
     """The pixel (2,) of the point on screen that is nearest to a direction (3,) in the mesh frame."""
-    seen = observation.projected
-    nearness = np.where(seen.on_screen, along(observation.layout.rays, direction), -np.inf)
-    return np.asarray(seen.pixels[int(np.argmax(nearness))])
+    return np.asarray(observation.pixels[int(np.argmax(along(observation.mesh_rays, direction)))])
 
 
 def _disk(outline: Floats) -> tuple[Floats, float]:

@@ -16,21 +16,21 @@ from .pyramid import Pyramid
 
 
 def sample_strips(pyramid: Pyramid, pixels: Floats, levels: Levels, layout: CanvasLayout, on_screen: Mask) -> Image:
-    """Colors of a canvas (rows, columns[, channels]), at pixels (m, 2) of the frame, one for each slot.
+    """Colors of a canvas (rows, columns[, channels]), from pixels (n, 2) of the mesh's points.
 
-    levels: which picture of the pyramid colors each slot. on_screen (m,): the other slots have an arbitrary color.
+    levels: which picture of the pyramid colors each point. on_screen (n,): the other points, and cells without a point,
+    have an arbitrary color.
     """
     shape = layout.shape
     canvas = np.zeros((*shape, *pyramid.level(0).shape[2:]), dtype=np.uint8)
-    places = [pixels[:, axis].reshape(shape) for axis in range(2)]
-    shown, halvings = on_screen.reshape(shape), levels.halvings.reshape(shape)
+    shown = layout.spread(on_screen).reshape(shape)
+    with np.errstate(over="ignore"):
+        places = [layout.spread(each).reshape(shape) for each in pixels.T.astype(np.float32)]
     for piece in layout.pieces:
         region = piece.region
-        if not shown[region].any():
-            continue
-        level = int(halvings[region].max())
-        scale = 0.5**level
-        with np.errstate(over="ignore"):  # pixels count from the middle of the first one
-            x, y = ((axis[region] * scale + 0.5 * (scale - 1.0)).astype(np.float32) for axis in places)
-        canvas[region] = pyramid.at(level, x, y, shown[region])
+        if shown[region].any():
+            level = int(levels.halvings[piece.point])
+            # Pixels count from the middle of the first one.
+            x, y = ((each[region] + np.float32(0.5)) * np.float32(0.5**level) - np.float32(0.5) for each in places)
+            canvas[region] = pyramid.at(level, x, y, shown[region])
     return canvas

@@ -46,11 +46,11 @@ def painted(detector: Detector, orientation: Orientation) -> Observation:
     ahead = ahead_of(rays_of_pixels() @ orientation.level.T, orientation.height).reshape(IMAGE.shape[:2])
     picture = np.where(np.abs(ahead - 2.0) < 0.03, 220, 90).astype(np.uint8)
     seen = detector.observe(np.repeat(picture[:, :, None], 3, axis=2), orientation, LENS)
-    ahead = ahead_of(seen.layout.rays, seen.view.height)
+    ahead = ahead_of(seen.mesh_rays, seen.view.height)
     label = np.where(ahead < 4.0, 2, 3)
     label[np.abs(ahead - 2.0) < 0.06] = 1
     probabilities = np.eye(4, dtype=np.float32)[label] * 0.9 + 0.025
-    return replace(seen, manifest=replace(seen.manifest, classes=SOCCER), slot_answers=probabilities)
+    return replace(seen, manifest=replace(seen.manifest, classes=SOCCER), answers=probabilities)
 
 
 @given(yaw=st.floats(-3.0, 3.0), roll=st.floats(-0.2, 0.2), pitch=st.floats(0.1, 0.6))
@@ -94,8 +94,8 @@ def test_they_can_be_switched_off(detector):
 
 def test_a_point_without_a_probability_spoils_nothing_else(detector):
     seen = painted(detector, Orientation.from_roll_pitch(0.8, 0.0, 0.4))
-    broken = seen.slot_probabilities.copy()
+    broken = seen.answers.copy()
     broken[:: len(broken) // 7] = np.nan
-    found, whole = (locate_features(each, {}, Settings()) for each in (replace(seen, slot_answers=broken), seen))
+    found, whole = (locate_features(each, {}, Settings()) for each in (replace(seen, answers=broken), seen))
     assert len(found.border.points) == len(whole.border.points)
     assert found.border.points == pytest.approx(whole.border.points, abs=0.2)

@@ -59,8 +59,8 @@ def found_in(observation, look, explain=True, **settings):
 def observed(*places):
     """A picture of BALLS with a peak at each of these places (3,) [m], the first the highest."""
     rows = [("ball", each / np.linalg.norm(each), 0.0, 6.0 - 0.1 * number) for number, each in enumerate(places)]
-    projected = project(VIEW.layout, VIEW.rotation, VIEW.lens, VIEW.size).only(VIEW.layout.original)
-    answers = answers_of(VIEW, MANIFEST, rows)
+    projected = project(VIEW.mesh, VIEW.rotation, VIEW.lens, VIEW.size)
+    answers = answers_of(VIEW, MANIFEST, rows)[projected.answered]
     return Observation(Pyramid(picture_of(VIEW, *BALLS), "bgr"), VIEW, MANIFEST, projected, answers)
 
 
