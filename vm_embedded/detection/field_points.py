@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..field.features import FieldFeatures
+from ..field.features import FieldFeatures, Upright
 from ..field.find import find_features
-from ..field.ground_points import ROLES, GroundPoints
+from ..field.ground_points import ROLES, GroundMap, GroundPoints, ground_map
+from ..network.layout import Layout
 from .looking import Look
 from .observation import Observation
 from .profiles import brightness_along
 from .settings import Settings
 from .upright_bases import find_uprights
 
-_LOWEST = 1e-3
-"""Rays less steep than this do not meet the plane near enough to matter."""
+_MAPS: WeakKeyDictionary[Layout, GroundMap] = WeakKeyDictionary()
+"""Where the rays of layouts meet the plane, as long as a cache keeps these."""
 
 
 def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
@@ -29,40 +31,39 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
     if not set(ROLES) & set(names):
         return None
     view, pyramid = observation.view, observation.pyramid
-    posts, robots = (
-        find_uprights(observation, name, looks.get(name), settings) if name in observation.manifest.peaks else ()
-        for name in ("goal", "robot")
-    )
+
+    def uprights(name: str) -> tuple[Upright, ...]:
+        look = looks.get(name)
+        best = observation.peaks[name].part(slice(1)) if name in observation.manifest.peaks else ()
+        if not best or (look is None and best.probabilities[0] < settings.min_confidence):
+            return ()
+        return find_uprights(observation, name, look, settings)
+
     return find_features(
         ground_points(observation),
         view.picture_pixels,
         lambda stretches, count: brightness_along(view, pyramid, stretches, count),
-        posts,
-        robots,
+        uprights("goal"),
+        uprights("robot"),
     )
 
 
 def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
-    view, classes = observation.view, observation.manifest.classes
-    rays = observation.layout.rays.T
-    upward = rays[2, observation.shown]
-    order = np.argsort(upward, kind="stable")  # the mesh is nearly in this order
-    order = order[: np.searchsorted(upward, -_LOWEST, sorter=order)]
-    slots, scale = observation.shown[order], -view.height / upward[order]
-    positions = np.array([rays[0, slots] * scale, rays[1, slots] * scale])
-    columns = [  # 0 for NaN: one NaN would spoil the sums of all others
-        (each, np.fmax(column[slots], 0.0))
-        for each, column in zip(classes, observation.slot_probabilities.T, strict=True)
-        if each.kind == "background" or each.name in ROLES
-    ]
+    view, layout = observation.view, observation.layout
+    ground = _MAPS.get(layout)
+    if ground is None:
+        ground = _MAPS[layout] = ground_map(layout.rays, layout.places)
+    classes = observation.manifest.classes
+    names = [each.name for each in classes]
+    signs = [-1.0 if each.kind == "background" else float(each.name in ("field", "line")) for each in classes]
+    values = np.fmax(observation.slot_probabilities.T, 0.0)  # one NaN would spoil the sums of all others
     return GroundPoints(
-        positions=(view.heading[:2, :2] @ positions).T,
+        map=ground,
+        shown=observation.projected.on_screen,
+        line=values[names.index("line")] if "line" in names else np.zeros(len(layout), np.float32),
+        inside=np.array(signs, dtype=np.float32) @ values if "field" in names else None,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
-        classes={each.name: column for each, column in columns if each.name in ROLES},
-        outside=sum(
-            (column for each, column in columns if each.kind == "background"), np.zeros(len(slots), np.float32)
-        ),
-        ahead=view.heading[:2, 0],
+        heading=view.heading[:2, :2],
     )
