@@ -114,7 +114,7 @@ def test_only_places_with_a_chance_are_looked_at_again(scene):
         (0.005, [4, 4, 4]),
         (0.5, [4, 2, 2]),
         (0.95, [4]),
-    ):  # where no ball is, it sees one with 0.05
+    ):  # where no ball is: 0.05
         look = BrightDisk(passes=3, promising=promising)
         found_in(scene, look)
         assert look.seen == seen
