@@ -27,10 +27,10 @@ def sample_strips(pyramid: Pyramid, pixels: Floats, levels: Levels, layout: Canv
     with np.errstate(over="ignore"):
         places = [layout.spread(each).reshape(layout.shape) for each in pixels.T.astype(np.float32)]
     for piece in layout.pieces:
-        level = int(levels.halvings[piece.point])
+        level, region = int(levels.halvings[piece.point]), piece.region
         # Pixels count from the middle of the first one.
-        x, y = ((each[piece.region] + 0.5) * 0.5**level - 0.5 for each in places)
+        x, y = ((each[region] + 0.5) * 0.5**level - 0.5 for each in places)
         colors = cv2.remap(pyramid.level(level), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        canvas[piece.region] = colors
+        canvas[region] = colors
     planes = np.asarray(cv2.dnn.blobFromImage(canvas, 1.0 / 255.0), dtype=np.float32)  # one for each channel
     return planes.reshape(len(planes[0]), -1)[list(pyramid.channels)]
