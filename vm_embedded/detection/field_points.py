@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..field.features import FieldFeatures
+from ..field.features import FieldFeatures, Upright
 from ..field.find import find_features
-from ..field.ground_points import ROLES, GroundPoints
+from ..field.ground_points import ROLES, GroundMap, GroundPoints, ground_map
+from ..mesh.mesh import Mesh
 from .looking import Look
 from .observation import Observation
 from .profiles import brightness_along
 from .settings import Settings
 from .upright_bases import find_uprights
 
-_LOWEST = 1e-3
-"""Rays less steep than this do not meet the plane near enough to matter."""
+_MAPS: WeakKeyDictionary[Mesh, GroundMap] = WeakKeyDictionary()
+"""Where the rays of meshes meet the plane, as long as a cache keeps these."""
 
 
 def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
@@ -29,39 +31,43 @@ def locate_features(observation: Observation, looks: Mapping[str, Look], setting
     if not set(ROLES) & set(names):
         return None
     view, pyramid = observation.view, observation.pyramid
-    posts, robots = (
-        find_uprights(observation, name, looks.get(name), settings) if name in observation.manifest.peaks else ()
-        for name in ("goal", "robot")
-    )
+
+    def uprights(name: str) -> tuple[Upright, ...]:
+        look = looks.get(name)
+        best = observation.peaks[name].part(slice(1)) if name in observation.manifest.peaks else ()
+        if not best or (look is None and best.probabilities[0] < settings.min_confidence):
+            return ()
+        return find_uprights(observation, name, look, settings)
+
     return find_features(
         ground_points(observation),
         view.picture_pixels,
         lambda stretches, count: brightness_along(view, pyramid, stretches, count),
-        posts,
-        robots,
+        uprights("goal"),
+        uprights("robot"),
     )
 
 
 def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
-    view, classes = observation.view, observation.manifest.classes
-    rays = observation.mesh_rays.T
-    upward = rays[2]
-    order = np.argsort(upward, kind="stable")  # the mesh is nearly in this order
-    order = order[: np.searchsorted(upward, -_LOWEST, sorter=order)]
-    positions = np.take(rays[:2], order, axis=1) * (-view.height / upward[order])
-    columns = [  # 0 for NaN: one NaN would spoil the sums of all others
-        (each, np.fmax(column[order], 0.0))
-        for each, column in zip(classes, observation.probabilities.T, strict=True)
-        if each.kind == "background" or each.name in ROLES
-    ]
+    view, mesh, answered = observation.view, observation.view.mesh, observation.projected.answered
+    ground = _MAPS.get(mesh)
+    if ground is None:
+        core = np.arange(len(mesh)) if mesh.margin is None else np.flatnonzero(~mesh.margin)
+        ground = _MAPS[mesh] = ground_map(mesh.rays, core)
+    classes = observation.manifest.classes
+    names = [each.name for each in classes]
+    signs = [-1.0 if each.kind == "background" else float(each.name in ("field", "line")) for each in classes]
+    weights = np.array([[float(each == "line") for each in names], signs], dtype=np.float32)
+    values = np.zeros((2, len(mesh)), dtype=np.float32)
+    # One NaN would spoil the sums of all others.
+    values[:, answered] = weights @ np.fmax(observation.probabilities.T, np.float32(0.0))
     return GroundPoints(
-        positions=(view.heading[:2, :2] @ positions).T,
+        map=ground,
+        shown=observation.projected.core,
+        line=values[0],
+        inside=values[1] if "field" in names else None,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
-        classes={each.name: column for each, column in columns if each.name in ROLES},
-        outside=sum(
-            (column for each, column in columns if each.kind == "background"), np.zeros(len(order), np.float32)
-        ),
-        ahead=view.heading[:2, 0],
+        heading=view.heading[:2, :2],
     )

@@ -13,7 +13,7 @@ from ..arrays import Chosen, Floats, Mask, Singles
 from ..network.canvas_layout import CanvasLayout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
-from .color_normalization import normalized
+from .color_normalization import normalized, normalized_canvas
 from .peaks import Peaks, peaks_of
 from .prepared_view import PreparedView
 from .projection import Projection, project
@@ -99,12 +99,12 @@ def classify(
 ) -> Observation:
     """Sample the frame at projected points, and let the network classify them. See `observe`."""
     layout = view.layout
+    counted = layout.spread(projected.core)  # strips overlap in their margins, which must not count twice in the mean
     if isinstance(layout, CanvasLayout):
-        sampled = sample_strips(pyramid, projected.pixels, view.levels, layout)
+        canvas = sample_strips(pyramid, projected.pixels, view.levels, layout, projected.on_screen)
+        colors = normalized_canvas(canvas, pyramid.channels, manifest.colors, counted)
     else:
-        sampled = sample(pyramid, projected.pixels, view.levels)
-    # Strips overlap in their margins, whose colors must not count twice in the mean.
-    colors = normalized(sampled, manifest.colors, layout.spread(projected.core))
+        colors = normalized(sample(pyramid, projected.pixels, view.levels), manifest.colors, counted)
     watch.lap("sample")
     answers = network.run(layout, colors, projected.on_screen, projected.answered)
     watch.lap("infer")

@@ -122,9 +122,8 @@ def cut_patches(pyramid: Pyramid, nodes: Singles, size: int) -> Image:
     patches = np.empty((len(levels), size, size, 3), dtype=np.uint8)
     for level in np.flatnonzero(np.bincount(levels)).tolist():
         rows = np.flatnonzero(levels == level)
-        tables = x[rows].reshape(-1, size), y[rows].reshape(-1, size)
-        colors = cv2.remap(pyramid.level(level), *tables, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        patches[rows] = _rgb(np.asarray(colors, dtype=np.uint8), pyramid.channels).reshape(-1, size, size, 3)
+        colors = pyramid.at(level, x[rows].reshape(-1, size), y[rows].reshape(-1, size))
+        patches[rows] = _rgb(colors, pyramid.channels).reshape(-1, size, size, 3)
     return patches
 
 

@@ -25,7 +25,7 @@ _LEAST = -3.9
 _FARTHEST = 2.0
 """Limit of a shift [cells]: straight ways along the mesh lead astray from farther away."""
 
-_MOST = 128
+_MOST = 32
 """Largest number of peaks of a class that are compared in pairs: a frame of noise must not take much longer."""
 
 _RIGHT, _LEFT, _UP, _DOWN = (Octaves.steps.index(step) for step in ((1, 0), (-1, 0), (0, 1), (0, -1)))
