@@ -24,9 +24,6 @@ from .pyramid import Pyramid
 from .settings import Settings
 from .stopwatch import Stopwatch
 
-_WORTH = 0.005
-"""Probability that a place needs from the look before, to be worth another one."""
-
 _SUREST = 1.0 - 1e-6
 """Limit of a probability: one that is rounded to 1 would outvote all others in a mean, and pass a threshold of 1."""
 
@@ -128,7 +125,7 @@ def look_at(places: Places, look: Look) -> Singles:
     for _ in range(look.contract.passes if len(places) else 0):
         found = answers[rows] = look.run(places.cut(rows, look.contract))
         possible = places.move(rows, found[:, 1].astype(np.float64), found[:, 2].astype(np.float64))
-        rows = rows[possible & (found[:, 0] > _WORTH)]
+        rows = rows[possible & (found[:, 0] > look.contract.promising)]
         if not len(rows):
             break
     return answers

@@ -24,7 +24,7 @@ from .stopwatch import Stopwatch
 from .strip_sampling import sample_strips
 
 
-class Network(Protocol):
+class Classifier(Protocol):
     """Anything that gives points their probabilities: a Session, or a network in torch."""
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask, points: Chosen) -> Singles:
@@ -77,7 +77,7 @@ class Observation:
 
 
 def observe(
-    pyramid: Pyramid, view: PreparedView, manifest: Manifest, network: Network, settings: Settings, watch: Stopwatch
+    pyramid: Pyramid, view: PreparedView, manifest: Manifest, network: Classifier, settings: Settings, watch: Stopwatch
 ) -> Observation:
     """Project the view's points into the frame and classify them.
 
@@ -93,7 +93,7 @@ def classify(
     view: PreparedView,
     projected: Projection,
     manifest: Manifest,
-    network: Network,
+    network: Classifier,
     settings: Settings,
     watch: Stopwatch,
 ) -> Observation:

@@ -11,11 +11,11 @@ from ..arrays import Chosen, Mask, Singles
 from ..errors import ModelError
 from ..mesh.mesh import Mesh
 from .choose_layout import choose_layout
+from .example import SelfTest
 from .layout import Layout
 from .manifest import Manifest
 from .model_file import ModelFile
 from .onnx_model import Interface, OnnxModel
-from .self_test import SelfTest
 
 
 class Session:

@@ -20,7 +20,7 @@ from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Network, Observation, classify
+from vm_embedded.detection.observation import Classifier, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
@@ -92,7 +92,7 @@ class ExactSubject:
     grid: Grid
     sha256: str
     settings: Settings
-    network: Network
+    network: Classifier
     looks: Mapping[str, CloseLook] = field(default_factory=dict)
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
@@ -206,7 +206,7 @@ class TorchNetwork:
         self._network = checkpoint.network
 
     def run(self, layout: Layout, colors: Singles, on_screen: Mask, points: Chosen) -> Singles:
-        """See detection.observation.Network."""
+        """See detection.observation.Classifier."""
         import torch
 
         def network(feeds: Feeds) -> Singles:

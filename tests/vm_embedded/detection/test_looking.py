@@ -35,8 +35,8 @@ NOTHING = tuple(center_at(VIEW, each) for each in ((560.0, 400.0), (100.0, 420.0
 class BrightDisk:
     """Answers as a perfect look network does to a picture of white balls on black ground, by arithmetic."""
 
-    def __init__(self, passes=2):
-        self.contract = look_contract(size=32, extent=EXTENT, max_proposals=40, passes=passes)
+    def __init__(self, passes=2, **contract):
+        self.contract = look_contract(size=32, extent=EXTENT, max_proposals=40, passes=passes, **contract)
         self.seen = []
 
     def run(self, patches):
@@ -132,19 +132,14 @@ class Fixed(BrightDisk):
 
 
 def test_only_places_with_a_chance_are_looked_at_again(scene):
-    look = BrightDisk()
-    found_in(scene, look)
-    assert look.seen == [4, 4]  # 0.05 is a chance
-
-    class Sure(BrightDisk):
-        def run(self, patches):
-            answers = super().run(patches)
-            answers[answers[:, 0] < 0.5, 0] = 0.0
-            return answers
-
-    look = Sure(passes=3)
-    found_in(scene, look)
-    assert look.seen == [4, 2, 2]
+    for promising, seen in (
+        (0.005, [4, 4, 4]),
+        (0.5, [4, 2, 2]),
+        (0.95, [4]),
+    ):  # where no ball is: 0.05
+        look = BrightDisk(passes=3, promising=promising)
+        found_in(scene, look)
+        assert look.seen == seen
 
 
 def test_what_is_too_improbable_has_a_reason(scene):

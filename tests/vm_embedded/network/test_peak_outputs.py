@@ -11,9 +11,9 @@ from vm_embedded import Detector, Orientation
 from vm_embedded.errors import ModelError
 from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_embedded.network.choose_layout import choose_layout
+from vm_embedded.network.example import SelfTest
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import parse_model, sealed
-from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
 from ..strategies import SIZE
