@@ -75,8 +75,8 @@ def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
 def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
     """A call of the network alone on a mesh, with prepared inputs."""
     layout = choose_layout(mesh, detector.manifest)
-    colors = np.random.default_rng(0).random((3, len(layout.slots)), dtype=np.float32)
-    feeds = layout.feeds(colors, layout.slots < len(mesh))
+    colors = np.random.default_rng(0).random((3, len(mesh)), dtype=np.float32)
+    feeds = layout.feeds(colors, np.ones(len(mesh), dtype=bool))
     model = detector.session.onnx
     return lambda: model.run(feeds)
 
@@ -128,7 +128,7 @@ def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any
         }
         times = interleaved(calls, rounds)  # type: ignore[arg-type]
         row: dict[str, Any] = dict(times)
-        row |= {"frame": frame.name, "points": len(seen.pixels), "slots": len(seen.observation.layout)}
+        row |= {"frame": frame.name, "points": len(seen.pixels)}
         row["whole_over_session"] = round(row["whole"]["p50"] / row["session"]["p50"], 2)
         row["p99_over_p50"] = round(row["whole"]["p99"] / row["whole"]["p50"], 2)
         found[name] = row

@@ -10,7 +10,7 @@ import numpy as np
 from tests.manifests import ball_manifest
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.look_contract import LookContract, look_key
-from vm_embedded.network.look_test import ANSWERS
+from vm_embedded.network.look_example import ANSWERS
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 MIXTURE = np.array([[0.001, 0.002, 0.003, 0.0], [0.0, 0.001, -0.002, 0.004], [0.002, 0.0, 0.0, 0.001]])

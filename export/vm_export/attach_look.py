@@ -12,7 +12,7 @@ import vm_embedded
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.look_contract import LookContract, look_key
-from vm_embedded.network.look_test import LookTest, made_patches
+from vm_embedded.network.look_example import LookTest, made_patches
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 from .look_checkpoint import LookCheckpoint

@@ -11,7 +11,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import cast
 
-import numpy as np
 import torch
 from torch import nn
 
@@ -115,13 +114,13 @@ class CanvasNetwork(nn.Module):
         runtime places them.
         """
         count = len(cells)
-        _, shape, slot = place_on_canvas(cells.cpu().numpy(), np.ones(count, dtype=bool))
-        slots = torch.from_numpy(slot.astype(np.int64)).to(points.device)
+        _, shape, found = place_on_canvas(cells.cpu().numpy())
+        places = torch.tensor(found).to(points.device)
         canvas = torch.zeros((4, shape[0] * shape[1]), dtype=points.dtype, device=points.device)
-        canvas[:3, slots], canvas[3, slots] = points[:count].T, 1.0
+        canvas[:3, places], canvas[3, places] = points[:count].T, 1.0
         canvas = canvas.reshape(1, 4, *shape)
-        found = self.canvas_logits(canvas[:, :3], canvas[:, 3:])[0].flatten(1)
-        return torch.cat([found[:, slots], torch.zeros_like(found[:, :1])], dim=1).T
+        outputs = self.canvas_logits(canvas[:, :3], canvas[:, 3:])[0].flatten(1)
+        return torch.cat([outputs[:, places], torch.zeros_like(outputs[:, :1])], dim=1).T
 
     def probabilities(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
         """Probabilities (n + 1, C); see `logits`."""

@@ -15,10 +15,10 @@ from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
 from vm_embedded.mesh.grids import STEPS, lattice_neighbors
+from vm_embedded.network.example import SelfTest
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile, parse_model
-from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
 from .attach_canary import CanaryPicture, with_canary

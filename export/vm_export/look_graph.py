@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.network.look_test import ANSWERS
+from vm_embedded.network.look_example import ANSWERS
 
 from .eight_bits import integers_of
 from .look_network import NOISE_FLOOR, LookNetwork

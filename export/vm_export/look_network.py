@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from vm_embedded.errors import InputError
-from vm_embedded.network.look_test import ANSWERS
+from vm_embedded.network.look_example import ANSWERS
 
 _WIDEST = 1024
 """Limit of every width."""

@@ -8,17 +8,17 @@ likely points are candidates, and their points decide: propose, fit, judge (`can
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import cv2
 import numpy as np
 
 from ..arrays import Floats, Singles
+from .at_peaks import Judged
 from .candidates import Candidate, propose
 from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
-from .looking import Judgment, Look, judge_peaks
+from .looking import Judgment
 from .observation import Observation
 from .projection import along
 from .settings import Settings
@@ -30,26 +30,20 @@ expected one by at most this share."""
 
 
 def locate(
-    observation: Observation,
-    looks: Mapping[str, Look],
-    settings: Settings,
-    watch: Stopwatch,
-    explain: bool = False,
+    observation: Observation, judged: Judged, settings: Settings, watch: Stopwatch, explain: bool = False
 ) -> tuple[tuple[Detection, ...], tuple[Detection, ...]]:
     """The objects that an observation shows, most confident first, and, with `explain`, the rejected candidates.
 
-    It searches only for classes of the kind "object". looks: look networks by class. watch: gets the stage cluster;
-    with peaks also propose, with a look look. Raises ModelError if a look network does not run.
+    It searches only for classes of the kind "object". judged: what is at the peaks. watch: gets the stage cluster.
     """
     objects: list[Detection] = []
     rejected: list[Detection] = []
-    for object_class, probabilities in zip(observation.manifest.classes, observation.slot_probabilities.T, strict=True):
+    for object_class, probabilities in zip(observation.manifest.classes, observation.probabilities.T, strict=True):
         name = object_class.name
         if object_class.kind != "object":
             continue
-        if name in observation.manifest.peaks:
-            judged = judge_peaks(observation, observation.peaks[name], looks.get(name), settings, watch, explain)
-            found = [_describe_judgment(observation, name, each) for each in judged]
+        if name in judged:
+            found = [_describe_judgment(observation, name, each) for each in judged[name][1]]
         else:
             candidates = _candidates(observation, name, probabilities, settings)
             found = [_describe_candidate(observation, each) for each in candidates if explain or each.reason is None]
@@ -76,7 +70,7 @@ def _candidates(
 def _describe_candidate(observation: Observation, candidate: Candidate) -> Detection:
     """The candidate as a detection: its confidence is the mean probability of the points inside its outline."""
     view = observation.view
-    offset = view.shape.offset(view.layout.rays[candidate.near], candidate.center[None], view.height)[0]
+    offset = view.shape.offset(candidate.rays, candidate.center[None], view.height)[0]
     inside = candidate.probabilities[offset < 1.0]
     scale = best_scale(view, candidate, offset)
     return _detection(
@@ -95,7 +89,7 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
 def _describe_judgment(observation: Observation, class_name: str, judgment: Judgment) -> Detection:
     """A peak or what a close look saw there, as a detection."""
     view = observation.view
-    covered = view.shape.covers(view.layout.rays, judgment.center[None], view.height)[0]
+    covered = view.shape.covers(observation.mesh_rays, judgment.center[None], view.height)[0]
     return _detection(
         observation,
         class_name,
@@ -103,7 +97,7 @@ def _describe_judgment(observation: Observation, class_name: str, judgment: Judg
         confidence=judgment.confidence,
         scale=judgment.scale,
         distances_agree=abs(judgment.scale - 1.0) <= _SAME_SIZE,
-        points=int(np.count_nonzero(covered & observation.projected.on_screen)),
+        points=int(np.count_nonzero(covered)),
         reason=judgment.reason,
     )
 
@@ -150,9 +144,7 @@ def _detection(
 
 def _nearest_pixel(observation: Observation, direction: Floats) -> Floats:
     """The pixel (2,) of the point on screen that is nearest to a direction (3,) in the mesh frame."""
-    seen = observation.projected
-    nearness = np.where(seen.on_screen, along(observation.layout.rays, direction), -np.inf)
-    return np.asarray(seen.pixels[int(np.argmax(nearness))])
+    return np.asarray(observation.pixels[int(np.argmax(along(observation.mesh_rays, direction)))])
 
 
 def _disk(outline: Floats) -> tuple[Floats, float]:

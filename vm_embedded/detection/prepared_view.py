@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..geometry.lens import Lens, Size
 from ..geometry.shape import Shape
+from ..mesh.mesh import Mesh
 from ..network.layout import Layout
 from .footprint import Levels
 from .projection import to_camera
@@ -17,14 +18,15 @@ from .projection import to_camera
 class PreparedView(NamedTuple):
     """The mesh points that can be on screen, the camera that sees them, and the object that is sought among them.
 
-    layout: the points in the network's order. levels: which picture of the pyramid colors each point. shape: of the
-    real object. rings: number of mesh rings that cross it. height: of the camera over the observation plane [m]. The
-    mesh frame is the observation plane's without the camera's yaw: x is ahead of the camera, z up. Objects are sought
+    mesh: the points. layout: how the network takes them. levels: which picture of the pyramid colors each point. shape:
+    of the real object. rings: number of mesh rings that cross it. height: of the camera over the plane [m]. The mesh
+    frame is the observation plane's without the camera's yaw: x is ahead of the camera, z up. Objects are sought
     in it. rotation (3, 3): camera to mesh frame. heading (3, 3): mesh frame to the observation plane's, a turn around
     the vertical; with a height tolerance of 0 the yaw is not removed, and heading is the identity. lens, size [px]: of
     the frame. A named tuple, because each frame makes one: a frozen dataclass takes four times as long.
     """
 
+    mesh: Mesh
     layout: Layout
     levels: Levels
     shape: Shape

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Chosen, Floats
-from .lines import LinePoints
+from .lines import LinePoints, tolerance
 
 _TRIES = 300
 """Number of circles that are tried."""
@@ -83,14 +83,15 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
 
 def _best_circle(points: LinePoints) -> tuple[Floats, float] | None:
     """Center (2,) [m] and radius [m] of the circle through three points that most of them are on."""
-    centers, radii = _through(points.positions[(_SHARES * len(points)).astype(np.intp)])
+    centers, radii = _through(points.positions.T[(_SHARES * len(points)).astype(np.intp)])
     possible = (radii > _RADII[0]) & (radii < _RADII[1])
     if not possible.any():
         return None
     centers, radii = centers[possible], radii[possible]
-    x, y = points.positions.T.astype(np.float32)[:, :, None] - centers.T.astype(np.float32)[:, None]  # (n, t)
+    x, y = points.positions.astype(np.float32)[:, :, None] - centers.T.astype(np.float32)[:, None]  # (n, t)
     off = np.abs(np.sqrt(x * x + y * y) - radii.astype(np.float32))
-    tolerance = 0.04 + 0.6 * points.blur
+    ranges = np.hypot(*points.positions) / points.ground.height
+    tolerance = 0.04 + 0.3 * points.ground.across * np.sqrt(ranges**2 + 1.0)
     best = int(np.argmax(points.weights @ (2.0 * (off < tolerance[:, None]) - (off < 0.5 * radii))))
     return centers[best], float(radii[best])
 
@@ -109,11 +110,11 @@ def _through(triples: Floats) -> tuple[Floats, Floats]:
 def _around(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, Floats, Floats]:
     """Unit vectors (2, n) from the center of a circle to points, how far they are outside of it (n,) [m], and how far
     they may be (n,) [m]."""
-    places = points.positions.T
+    places = points.positions
     away = places - center[:, None]
     lengths = np.maximum(np.hypot(*away), 1e-9)
     away /= lengths
-    return away, lengths - radius, points.tolerance((places * away).sum(axis=0))
+    return away, lengths - radius, tolerance((places * away).sum(axis=0), points.leaning, points.ground)
 
 
 def _checked(points: LinePoints, free: Chosen, center: Floats, radius: float) -> CirclePoints | None:

@@ -44,7 +44,7 @@ def find_features(
     likely = near.part(np.flatnonzero(near.weights > LEAST))
     pieces, circle = _straight_and_round(near, likely)
     pieces = pieces_on_ridges(pieces, points, profiles)
-    border = find_border(points) if "field" in points.classes else np.empty((0, 2))
+    border = find_border(points)
     ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
     end_pixels, border_pixels = np.split(to_pixels(np.concatenate([ends, border])), [len(ends)])  # faster at once
     lines = tuple(
@@ -89,9 +89,11 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     """Mean places (p, 2) [m] and probabilities (p,) of the line points in each square."""
     if not len(points):
         return np.empty((0, 2)), np.empty(0, np.float32)
-    cells = np.floor(points.positions * (1.0 / _CELL)) @ (1024.0, 1.0)  # points of a square have the same number
+    cells = np.array([1024.0, 1.0]) @ np.floor(
+        points.positions * (1.0 / _CELL)
+    )  # points of a square have the same number
     order = np.argsort(cells)
     starts = starts_of_runs(cells[order])
-    columns = np.array([*points.positions.T, points.weights])[:, order]
+    columns = np.array([*points.positions, points.weights])[:, order]
     x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
     return np.array([x, y]).T, weights.astype(np.float32)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -24,24 +23,6 @@ MOST_POINTS = 8_000_000
 
 STRIDE = 1024
 """Rows from one strip of a mesh to the next: the cells of strip s are in the rows from STRIDE s."""
-
-
-class PointGraph(Protocol):
-    """n points with their rays and links: a mesh, or a mesh laid out for a network (network.layout.Layout)."""
-
-    @property
-    def rays(self) -> Floats:
-        """Unit vectors (n, 3) from the camera, in the mesh frame."""
-
-    @property
-    def strips(self) -> Indices | None:
-        """The strip (n,) of each point, -1 for none, in which all points stand for areas of the same size; None for a
-        mesh without strips."""
-
-    def __len__(self) -> int: ...
-
-    def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        """Neighbors (m, N) of the points `members` (m,); n is the off-screen point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,12 +47,16 @@ class Mesh:
 
     @property
     def strips(self) -> Indices | None:
-        """The strip (n,) of each point; None for a mesh without strips."""
+        """The strip (n,) of each point, in which all points stand for areas of the same size; None for a mesh without
+        strips."""
         return None if self.cells is None else self.cells[:, 1] // np.int32(STRIDE)
 
-    def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        """Neighbors (m, N) of the points `members` (m,)."""
-        return np.take(self.neighbors, members, axis=0)
+    def needed(self, kept: Mask) -> Mask:
+        """The points of a part `kept` (n,) that a network needs: not those of a strip of which it has only margin."""
+        strips = self.strips
+        if strips is None or self.margin is None:
+            return kept
+        return kept & (np.bincount(strips, kept & ~self.margin) > 0.0)[strips]
 
     @property
     def nbytes(self) -> int:

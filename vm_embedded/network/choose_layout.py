@@ -12,6 +12,5 @@ from .plain_layout import PlainLayout
 def choose_layout(mesh: Mesh, manifest: Manifest) -> Layout:
     """The mesh in the layout that the manifest's network takes."""
     if manifest.on_canvas:
-        assert manifest.model.steps is not None
-        return CanvasLayout(mesh, manifest.model.steps)
+        return CanvasLayout(mesh)
     return PlainLayout(mesh, manifest.edge)

@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import Image, Singles
 from ..errors import ModelError
 from .look_contract import LookContract
-from .look_test import ANSWERS
+from .look_example import ANSWERS
 from .model_file import ModelFile
 from .onnx_model import OnnxModel
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..borders.text import name_fault, text_fault
 from ..errors import ModelError
-from .look_test import LookTest
+from .look_example import LookTest
 
 
 def look_key(object_class: str) -> str:
@@ -29,6 +29,7 @@ class LookContract:
     max_proposals: largest number of peaks of the mesh network that it judges in a picture, 1 to 128.
     passes: how often a peak is judged at most, 1 to 4; each further pass judges a new patch around the center that the
         previous pass found.
+    promising: probability that a peak needs in a pass to be judged again, 0 to 1.
     mesh_weight: how much the score of a peak of the mesh network counts beside this network's answer, 0 to 2: it is
         added so many times to the answer's log-odds.
     channels: of the network's convolutions at each resolution; the runtime does not use them.
@@ -44,6 +45,7 @@ class LookContract:
     extent: float
     max_proposals: int
     passes: int
+    promising: float = 0.005
     mesh_weight: float = 0.0
     channels: tuple[int, ...] = ()
     self_test: LookTest | None = None
@@ -61,6 +63,7 @@ class LookContract:
             ("extent", False, 0.5, 8.0),
             ("max_proposals", True, 1, 128),
             ("passes", True, 1, 4),
+            ("promising", False, 0.0, 1.0),
             ("mesh_weight", False, 0.0, 2.0),
         ):
             value = getattr(self, name)
@@ -79,9 +82,10 @@ class LookContract:
 
     @classmethod
     def from_dict(cls, data: object) -> LookContract:
-        """Inverse of `as_dict`. Raises ModelError for missing, unknown or malformed entries."""
+        """Inverse of `as_dict`, but `promising` may be missing. Raises ModelError for other missing, unknown or
+        malformed entries."""
         names = {each.name for each in fields(cls)}
-        if not isinstance(data, dict) or set(data) != names:
+        if not isinstance(data, dict) or set(data) | {"promising"} != names:
             found = sorted(data) if isinstance(data, dict) else data
             raise ModelError(f"a look in the model's manifest must have the entries {sorted(names)}, not {found!r}")
         try:

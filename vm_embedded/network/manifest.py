@@ -18,8 +18,8 @@ from ..geometry.shape import Shape
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
+from .example import SelfTest
 from .look_contract import LookContract, check_provenance
-from .self_test import SelfTest
 
 METADATA_KEY = "visual_mesh"
 FORMAT_VERSION = 8

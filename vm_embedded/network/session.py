@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Mask, Singles
+from ..arrays import Chosen, Mask, Singles
 from ..errors import ModelError
 from ..mesh.mesh import Mesh
 from .choose_layout import choose_layout
+from .example import SelfTest
 from .layout import Layout
 from .manifest import Manifest
 from .model_file import ModelFile
 from .onnx_model import Interface, OnnxModel
-from .self_test import SelfTest
 
 
 class Session:
@@ -33,8 +33,8 @@ class Session:
         if model.manifest.self_test is not None:
             self._check(model.manifest.self_test)
 
-    def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """Answers (m, outputs) to a layout's slots, from their colors (3, m) and which slots (m,) are on screen.
+    def run(self, layout: Layout, colors: Singles, on_screen: Mask, points: Chosen) -> Singles:
+        """All outputs (k, outputs) for points (k,) on screen; see `Layout.answers`.
 
         Raises ModelError, also for answers that are not finite, and for several threads in a process that was forked
         after the model was loaded.
@@ -44,8 +44,8 @@ class Session:
                 f"{self.model.path}: its {self.onnx.threads} threads belong to another process; "
                 "load the detector in each process, or use one thread"
             )
-        answers = layout.answers(self.onnx.run, colors, on_screen)
-        if not (np.isfinite(answers).all(axis=1) | ~on_screen).all():
+        answers = layout.answers(self.onnx.run, colors, on_screen, points)
+        if not np.isfinite(answers).all():
             raise ModelError(f"{self.model.path}: its answers are NaN or infinite")
         return answers
 
@@ -54,8 +54,8 @@ class Session:
         mesh = Mesh(np.zeros((len(test.points) - 1, 3)), test.neighbors, test.cells)
         # In an example a missing neighbor is always the off-screen point, also for networks with another edge policy.
         layout = choose_layout(mesh, replace(self.model.manifest, edge="hard"))
-        colors = test.points[layout.slots].T
-        return self.run(layout, colors, layout.slots < len(mesh))[layout.places]
+        colors = np.stack([layout.spread(each) for each in test.points[:-1].T])
+        return self.run(layout, colors, np.ones(len(mesh), dtype=bool), np.arange(len(mesh)))
 
     def _check(self, test: SelfTest) -> None:
         """Run the model's own example. Raises ModelError if the answer differs from the exporter's."""

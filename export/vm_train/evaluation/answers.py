@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from vm_embedded.arrays import Floats, Mask, Singles
+from vm_embedded.arrays import Chosen, Floats, Mask, Singles
+from vm_embedded.detection.at_peaks import judge_classes
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Network, Observation, classify
+from vm_embedded.detection.observation import Classifier, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView
-from vm_embedded.detection.projection import Projection
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -29,6 +29,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.field.features import FieldFeatures
 from vm_embedded.files import read_bytes
 from vm_embedded.geometry.orientation import rotation_z
+from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.layout import Feeds, Layout
@@ -91,7 +92,7 @@ class ExactSubject:
     grid: Grid
     sha256: str
     settings: Settings
-    network: Network
+    network: Classifier
     looks: Mapping[str, CloseLook] = field(default_factory=dict)
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
@@ -99,9 +100,10 @@ class ExactSubject:
         found: tuple[Detection, ...] = ()
         features = None
         if self.grid.is_visual:
-            found, _ = locate(observation, self.looks, self.settings, Stopwatch())
             is_wanted = self.settings.field_features
-            features = locate_features(observation, self.looks, self.settings) if is_wanted else None
+            judged = judge_classes(observation, self.looks, self.settings, Stopwatch(), uprights=is_wanted)
+            found, _ = locate(observation, judged, self.settings, Stopwatch())
+            features = locate_features(observation, judged) if is_wanted else None
         return _answer(observation, found, features, self.looks)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:
@@ -110,13 +112,8 @@ class ExactSubject:
         if radius is not None:
             manifest = replace(manifest, radius=radius, object_radius=radius)
         shown = seen_points(picture.lens, picture.size, manifest, self.grid)
-        layout = choose_layout(shown.graph, manifest)
-        pixels = np.append(shown.pixels, np.full((1, 2), np.nan), axis=0)[layout.slots]  # NaN in gaps
-        projected = Projection(layout, pixels, layout.slots < len(shown))
-        view = _view(picture, layout, manifest, self.grid)
-        return classify(
-            Pyramid(picture.image, "bgr"), view, projected, manifest, self.network, self.settings, Stopwatch()
-        )
+        view = _view(picture, shown.graph, manifest, self.grid)
+        return classify(Pyramid(picture.image, "bgr"), view, shown, manifest, self.network, self.settings, Stopwatch())
 
 
 @dataclass(eq=False)
@@ -158,12 +155,13 @@ def _answer(
     )
 
 
-def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> PreparedView:
-    """The view of a picture with a mesh for its own height."""
+def _view(picture: Picture, mesh: Mesh, manifest: Manifest, grid: Grid) -> PreparedView:
+    """The view of a picture with this mesh for its own height."""
     orientation = picture.orientation
     return PreparedView(
-        layout=layout,
-        levels=levels_of(picture, layout, manifest, grid),
+        mesh=mesh,
+        layout=choose_layout(mesh, manifest),
+        levels=levels_of(picture, mesh, manifest, grid),
         shape=manifest.object_shape,
         rings=manifest.rings_across(orientation.height, orientation.height),
         height=orientation.height,
@@ -207,8 +205,8 @@ class TorchNetwork:
         torch.set_num_threads(1)
         self._network = checkpoint.network
 
-    def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """All outputs (m, outputs) for the slots, from their colors (3, m)."""
+    def run(self, layout: Layout, colors: Singles, on_screen: Mask, points: Chosen) -> Singles:
+        """See detection.observation.Classifier."""
         import torch
 
         def network(feeds: Feeds) -> Singles:
@@ -216,4 +214,4 @@ class TorchNetwork:
                 output = self._network(**{name: torch.from_numpy(each) for name, each in feeds.items()})
             return np.asarray(output.numpy(), dtype=np.float32)
 
-        return layout.answers(network, colors, on_screen)
+        return layout.answers(network, colors, on_screen, points)

@@ -24,13 +24,13 @@ from ..runs.learner import DivergedError
 from ..runs.loop import Progress, Training, Validation, shown
 from ..scores.calibration import Calibration
 from ..scores.object_ranking import Ranking
-from .judging import judge_validation
 from .labels import OBJECT
 from .patch_set import PatchSet
 from .run import LookRun
 from .scores import LookScore, logits_of, result_in_words, result_values
 from .trainer import LookTrainer
 from .training_patches import TrainingPatches, collect
+from .validation import judge_validation
 
 _EXAMPLES = 2
 """Patches with an object, and as many without, for the self-test of the model file."""
@@ -133,7 +133,7 @@ class LookTraining(Training):
             "validation_proposals": str(len(found.validation)),
             "patches_sha256": found.training.sha256(),
             "mesh_sha256": run.digests[run.mesh.name],
-            "configuration_sha256": run.digests["look.toml"],
+            "look_toml_sha256": run.digests["look.toml"],
             "epochs": str(recipe.epochs),
             "rounds": str(recipe.rounds),
             "seed": str(recipe.seed),

@@ -4,28 +4,24 @@ import numpy as np
 
 
 def cells_to(view, ray):
-    """Right and up [cells] from each slot (m,) to a ray (3,): by the azimuths and inclinations of columns and rows, and
-    on the plane around the foot. NaN in gaps."""
-    layout = view.layout
-    right, up = np.full((2, len(layout)), np.nan)
-    for piece in layout.pieces:
-        box = np.arange(len(layout)).reshape(layout.shape)[piece.region]
-        x, y, z = layout.rays[box].transpose(2, 0, 1)
-        held = np.isfinite(z)
-        row, cells, used = np.nonzero(held)[0], box[held], np.flatnonzero(held.any(axis=1))
-        lowest, highest = (find(z[used], axis=1) for find in (np.nanmin, np.nanmax))
-        if (highest - lowest).max() > 1e-9:  # a lattice of the plane
-            step = np.nanmax(np.abs(np.diff(-y / z, axis=1)))
-            right[cells] = (ray[1] / ray[2] - (y / z)[held]) / step
-            up[cells] = ((x / z)[held] - ray[0] / ray[2]) / step
+    """Right and up [cells] from each point (n,) of the mesh to a ray (3,): by the azimuths and inclinations of columns
+    and rows, and on the plane around the foot."""
+    mesh = view.mesh
+    right, up = np.full((2, len(mesh)), np.nan)
+    for strip in np.unique(mesh.strips):
+        points = np.flatnonzero(mesh.strips == strip)
+        (column, row), (x, y, z) = mesh.cells[points].T, mesh.rays[points].T
+        rows, first, number = np.unique(row, return_index=True, return_inverse=True)
+        if np.abs(z - z[first][number]).max() > 1e-9:  # a lattice of the plane
+            step = np.ptp(y / z) / np.ptp(column)
+            right[points], up[points] = (ray[1] / ray[2] - y / z) / step, (x / z - ray[0] / ray[2]) / step
             continue
-        around = np.arctan2(y, x)
-        steps = np.abs(wrapped(np.diff(around, axis=1)))
-        if np.isfinite(steps).any():
-            right[cells] = wrapped(around[held] - np.arctan2(ray[1], ray[0])) / np.nanmean(steps)
-            inclinations = np.arccos(-lowest)
-            at = np.interp(np.arccos(-ray[2]), inclinations[::-1], used[::-1], left=np.nan, right=np.nan)
-            up[cells] = row - at
+        around, order = np.arctan2(y, x), np.lexsort([column, row])
+        beside = (np.diff(row[order]) == 0) & (np.diff(column[order]) == 1)
+        if beside.any():
+            step = np.abs(wrapped(np.diff(around[order])))[beside].mean()
+            right[points] = wrapped(around - np.arctan2(ray[1], ray[0])) / step
+            up[points] = np.interp(np.arccos(-ray[2]), np.arccos(-z[first]), rows, left=np.nan, right=np.nan) - row
     return right, up
 
 
@@ -34,8 +30,9 @@ def wrapped(angles):
 
 
 def answers_of(view, manifest, objects):
-    """Answers (m, outputs) of a network that knows objects: rows (class, ray, log size, height of the score)."""
-    answers = np.zeros((len(view.layout), manifest.outputs), dtype=np.float32)
+    """Answers (n, outputs) to the points of the mesh by a network that knows objects: rows (class, ray, log size,
+    height of the score)."""
+    answers = np.zeros((len(view.mesh), manifest.outputs), dtype=np.float32)
     first = len(manifest.classes)
     answers[:, first::4] = -12.0
     for name, ray, size, top in objects:

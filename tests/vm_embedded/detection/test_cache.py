@@ -37,21 +37,14 @@ def built(cache, height):
 def assert_same_as_without(cache, orientation, lens, size):
     """The prepared part gives what the whole mesh gives, to the last digit, of all points that are answered."""
     view = cache.view(orientation, lens, size)
-    slots, places = view.layout.slots, view.layout.places
-    prepared = project(view.layout, view.rotation, lens, size)
-    shown = places[prepared.on_screen[places]]
+    prepared = project(view.mesh, view.rotation, lens, size)
+    shown = prepared.answered
     mesh = built(cache, cache.mesh_height(orientation.height))
     answered = mesh if mesh.margin is None else mesh.part(np.flatnonzero(~mesh.margin))
     whole = project(answered, view.rotation, lens, size).visible
-    np.testing.assert_array_equal(view.layout.rays[shown], whole.graph.rays)
+    np.testing.assert_array_equal(view.mesh.rays[shown], whole.graph.rays)
     np.testing.assert_array_equal(prepared.pixels[shown], whole.pixels)
-    rank = np.full(len(view.layout) + 1, len(shown))
-    rank[shown] = np.arange(len(shown))
-    np.testing.assert_array_equal(rank[view.layout.links(shown)], whole.graph.neighbors[:-1])
-    if mesh.margin is None:  # Copies of a point are on screen where it is, and gaps never.
-        np.testing.assert_array_equal(prepared.on_screen, np.append(prepared.on_screen[places], False)[slots])
-    assert not prepared.on_screen[np.isnan(view.layout.rays[:, 0])].any()
-    assert prepared.only(view.layout.original).on_screen.sum() == len(whole)
+    np.testing.assert_array_equal(view.mesh.part(shown).neighbors, whole.graph.neighbors)
     np.testing.assert_allclose(view.heading @ view.rotation, orientation.rotation, atol=1e-12)
 
 
@@ -163,8 +156,7 @@ def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, mesh):
     cache = MeshCache(manifest(mesh=mesh), Settings(height_tolerance=tolerance))
     lens = Rectilinear(focal_length=600.0, fov=1.2)
     view = cache.view(Orientation.from_roll_pitch(0.8, pitch=-1.2), lens, SIZE)
-    assert len(view.layout.places) == 0
-    assert not project(view.layout, view.rotation, lens, SIZE).on_screen.any()
+    assert len(view.mesh) == 0
 
 
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
@@ -203,10 +195,10 @@ def test_nbytes_is_what_is_held(mesh):
     cache = MeshCache(manifest(mesh=mesh), Settings())
     first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
     whole = built(cache, cache.mesh_height(0.8))
-    one = first.layout.nbytes + first.levels.nbytes
+    one = sum(each.nbytes for each in (first.mesh, first.layout, first.levels))
     assert cache.nbytes == whole.nbytes + one
     second = cache.view(Orientation.from_roll_pitch(0.8, pitch=1.2), LENS, SIZE)
-    assert cache.nbytes == whole.nbytes + one + second.layout.nbytes + second.levels.nbytes
+    assert cache.nbytes == whole.nbytes + one + sum(each.nbytes for each in (second.mesh, second.layout, second.levels))
 
 
 def test_the_least_recently_used_mesh_goes_first():
@@ -234,11 +226,8 @@ def test_the_memory_limit_is_obeyed_and_changes_no_answer(mesh, order, cache_mib
         orientation = Orientation.from_roll_pitch(0.5 + 0.1 * (index % 3), pitch=0.3 + 0.2 * index)
         limited, unlimited = (each.view(orientation, LENS, SIZE) for each in (cache, free))
         assert cache.nbytes <= cache_mib * 2**20
-        np.testing.assert_array_equal(limited.layout.rays, unlimited.layout.rays)
-        places = limited.layout.places
-        np.testing.assert_array_equal(limited.layout.links(places), unlimited.layout.links(places))
-        np.testing.assert_array_equal(limited.layout.slots, unlimited.layout.slots)
-        np.testing.assert_array_equal(limited.layout.places, unlimited.layout.places)
+        np.testing.assert_array_equal(limited.mesh.rays, unlimited.mesh.rays)
+        np.testing.assert_array_equal(limited.mesh.neighbors, unlimited.mesh.neighbors)
     assert cache.hits + cache.misses == len(order)
 
 
@@ -246,7 +235,7 @@ def test_without_memory_nothing_is_held():
     cache = MeshCache(manifest(), Settings(cache_mib=0.0))
     orientation = Orientation.from_roll_pitch(0.8, pitch=0.4)
     for _ in range(3):
-        assert len(cache.view(orientation, LENS, SIZE).layout.places) > 0
+        assert len(cache.view(orientation, LENS, SIZE).mesh) > 0
     assert (cache.hits, cache.misses, cache.nbytes) == (0, 3, 0)
 
 

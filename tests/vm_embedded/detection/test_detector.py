@@ -40,8 +40,9 @@ def without_bucket(detector, image, orientation, lens):
     def whole(orientation, lens, size):
         view = prepared(orientation, lens, size)
         height = fresh.cache.mesh_height(orientation.height)
-        layout = choose_layout(fresh.cache._build(height), fresh.manifest)
-        return view._replace(layout=layout, levels=levels_for(fresh.manifest, layout, height, lens))
+        mesh = fresh.cache._build(height)
+        levels = levels_for(fresh.manifest, mesh, height, lens)
+        return view._replace(mesh=mesh, layout=choose_layout(mesh, fresh.manifest), levels=levels)
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)
@@ -222,9 +223,9 @@ def small_mesh():
 def test_neighbors_out_of_range_are_an_error_and_not_a_crash():
     session = Detector.from_file(MODEL).session
     broken = Broken(small_mesh(), "hard")
-    colors = np.zeros((3, len(broken)), dtype=np.float32)
+    colors = np.zeros((3, 4), dtype=np.float32)
     with pytest.raises(ModelError, match="can't run"):
-        session.run(broken, colors, broken.slots < 4)
+        session.run(broken, colors, np.ones(4, dtype=bool), np.arange(4))
 
 
 def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(tmp_path):
@@ -236,7 +237,7 @@ def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(tmp_pa
 
     def answers(session, mesh, shown=(True, True, True, True)):
         layout = choose_layout(mesh, session.model.manifest)
-        return session.run(layout, colors.T, np.array(shown))
+        return session.run(layout, colors.T, np.array(shown), np.arange(4))
 
     np.testing.assert_array_equal(answers(same, mesh), answers(hard, alone))
     assert np.abs(answers(same, mesh) - answers(hard, mesh)).max() > 1e-3

@@ -9,9 +9,9 @@ from tests.fixtures.make_drawn import FOLDER
 from vm_embedded.errors import ModelError
 from vm_embedded.live.proof import prove
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.look_test import LookTest
+from vm_embedded.network.example import SelfTest
+from vm_embedded.network.look_example import LookTest
 from vm_embedded.network.model_file import read_model
-from vm_embedded.network.self_test import SelfTest
 
 pytest.importorskip("onnxruntime")
 

@@ -185,11 +185,22 @@ def test_neighbors_are_those_of_the_strip_s_lattice(case):
     steps = np.array(mesh_model("octaves").steps)
     some = np.arange(0, len(mesh), max(len(mesh) // 200, 1))
     expected = [[point_at.get(tuple(cell), len(mesh)) for cell in mesh.cells[point] + steps] for point in some.tolist()]
-    np.testing.assert_array_equal(mesh.links(some), expected)
-    beside = mesh.links(some)
+    beside = mesh.neighbors[some]
+    np.testing.assert_array_equal(beside, expected)
     present = beside < len(mesh)
     assert (mesh.strips[np.minimum(beside, len(mesh) - 1)] == mesh.strips[some][:, None])[present].all()
     assert (mesh.neighbors[-1] == len(mesh)).all()
+
+
+@given(cases(), seeds)
+def test_a_network_needs_the_kept_points_of_strips_with_some_that_are_no_margin(case, seed):
+    mesh = build_mesh(*case, "octaves")
+    kept = np.random.default_rng(seed).random(len(mesh)) < 0.01
+    strips = {strip for strip, core in zip(mesh.strips.tolist(), kept & ~mesh.margin, strict=True) if core}
+    np.testing.assert_array_equal(mesh.needed(kept), kept & np.isin(mesh.strips, list(strips)))
+    rings = build_mesh(*case, "ring6")
+    everything = np.ones(len(rings), dtype=bool)
+    assert rings.needed(everything) is everything
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from tests.manifests import ball_manifest
 from vm_embedded.errors import ModelError
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.look_contract import LookContract
-from vm_embedded.network.look_test import LookTest
+from vm_embedded.network.look_example import LookTest
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 from vm_embedded.network.model_file import read_model
 
@@ -153,7 +153,11 @@ def from_json(**changes):
     return Manifest.from_json(json.dumps(data))
 
 
-@pytest.mark.parametrize("entry", sorted(look_contract().as_dict()))
+def test_a_look_without_the_entry_promising_has_the_default():
+    assert from_json(promising=...).looks[0].promising == from_json().looks[0].promising == 0.005
+
+
+@pytest.mark.parametrize("entry", sorted(look_contract().as_dict().keys() - {"promising"}))
 def test_a_missing_entry_is_refused(entry):
     with pytest.raises(ModelError, match=rf"look in the model's manifest must have the entries .*'{entry}'"):
         from_json(**{entry: ...})
@@ -190,6 +194,9 @@ def test_a_look_that_is_no_table_is_refused(look):
         ("passes", 0),
         ("passes", 5),
         ("passes", True),
+        ("promising", -0.1),
+        ("promising", 1.1),
+        ("promising", "never"),
         ("mesh_weight", 2.1),
         ("mesh_weight", -0.1),
         ("mesh_weight", True),
@@ -225,6 +232,7 @@ def contracts(draw):
         extent=draw(reals(0.5, 8.0)),
         max_proposals=draw(st.integers(1, 128)),
         passes=draw(st.integers(1, 4)),
+        promising=draw(reals(0.0, 1.0)),
         mesh_weight=draw(st.just(0.0) | reals(0.0, 2.0)),
         channels=tuple(draw(st.lists(st.integers(1, 99), max_size=4))),
         self_test=draw(st.sampled_from([None, test])),

@@ -20,7 +20,6 @@ from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.model_file import ModelFile
-from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.session import Session
 from vm_export.export import onnx_model
 from vm_export.network import Network
@@ -130,16 +129,10 @@ def tamed(network, logits):
 
 
 def answers(session, mesh, colors, on_screen):
-    """Probabilities (m, C) of all slots, and their layout. What is off screen gets no color at all."""
+    """Probabilities (k, C) of the points on screen. What is off screen gets no color at all."""
     layout = choose_layout(mesh, session.model.manifest)
-    shown = np.append(on_screen, False)[layout.slots]
-    return session.run(layout, slot_colors(layout, colors, shown), shown), layout
-
-
-def slot_colors(layout, colors, shown):
-    """Colors (3, m) of a layout's slots, from those of points (n, 3); NaN for slots that are not shown (m,)."""
-    padded = np.vstack([colors, np.zeros((1, 3))]).astype(np.float32)
-    return np.where(shown, padded[layout.slots].T, np.float32(np.nan))
+    shown = np.where(on_screen, colors.T, np.nan).astype(np.float32)
+    return session.run(layout, shown, on_screen, np.flatnonzero(on_screen))
 
 
 def session_of(network, model, **changes):
@@ -162,9 +155,9 @@ def assert_same_answers(network, model, mesh, on_screen, seed):
     head = network.shape.layers[-1].activation
     colors = np.random.default_rng(seed).random((len(mesh), 3))
     expected = tamed(network, torch_logits(network, mesh, colors, on_screen))
-    probabilities, arranged = answers(session_of(network, model), mesh, colors, on_screen)
-    assert probabilities.shape == (len(arranged.slots), network.shape.classes)
-    found = logits_of(probabilities[arranged.places][on_screen], head)
+    probabilities = answers(session_of(network, model), mesh, colors, on_screen)
+    assert probabilities.shape == (on_screen.sum(), network.shape.classes)
+    found = logits_of(probabilities, head)
     assert np.isfinite(found).all()
     np.testing.assert_allclose(found, expected if head == "sigmoid" else _centered(expected), rtol=0, atol=1e-5)
 
@@ -228,9 +221,8 @@ def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     session = session_of(network, model)
     arranged = choose_layout(mesh, session.model.manifest)
     for each, on_screen in zip(colors, shown, strict=True):
-        fresh, _ = answers(session, mesh, each, on_screen)
-        again = session.run(arranged, each.T, on_screen)
-        np.testing.assert_array_equal(again[on_screen], fresh[on_screen])
+        again = session.run(arranged, each.T, on_screen, np.flatnonzero(on_screen))
+        np.testing.assert_array_equal(again, answers(session, mesh, each, on_screen))
 
 
 @given(st.data(), models, seeds)
@@ -244,43 +236,18 @@ def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data,
     itself = np.arange(len(kept) + 1, dtype=np.int32)[:, None]
     alone = Mesh(part.rays, np.where(part.neighbors == len(kept), itself, part.neighbors))
     expected = tamed(network, torch_logits(network, alone, colors[kept], np.ones(len(kept), dtype=bool)))
-    probabilities, layout = answers(session_of(network, model, edge="same"), mesh, colors, on_screen)
+    probabilities = answers(session_of(network, model, edge="same"), mesh, colors, on_screen)
     head = network.shape.layers[-1].activation
     reference = expected if head == "sigmoid" else _centered(expected)
-    found = logits_of(probabilities[layout.places][on_screen], head)
+    found = logits_of(probabilities, head)
     np.testing.assert_allclose(found, reference, rtol=0, atol=1e-5)
-
-
-def arrays_of(layout):
-    return [layout.slots, layout.places, layout.original, layout.rays, layout._neighbors]
-
-
-@for_all_models
-def test_what_a_layout_holds_is_read_only_and_counted(model):
-    arranged = choose_layout(WHOLE[model], manifest_of(model))
-    for array in arrays_of(arranged):
-        assert not array.flags.writeable
-        with pytest.raises(ValueError, match="read-only"):
-            array[:1] = 0
-    assert arranged.nbytes == sum(array.nbytes for array in arrays_of(arranged))
 
 
 @for_all_models
 def test_rays_are_column_by_column_in_memory(model):
-    """As of every mesh; each frame's projection goes through them by columns."""
+    """Each frame's projection goes through them by columns."""
     for mesh in (WHOLE[model], WHOLE[model].part(np.arange(50, 230))):
-        assert choose_layout(mesh, manifest_of(model)).rays.T.flags.c_contiguous
-
-
-@for_all_models
-def test_plain_is_the_mesh_as_it_is(model):
-    layout = choose_layout(WHOLE[model], manifest_of(model))
-    assert isinstance(layout, PlainLayout)
-    assert layout.rays is WHOLE[model].rays
-    np.testing.assert_array_equal(layout.links(layout.places), WHOLE[model].neighbors[:-1])
-    np.testing.assert_array_equal(layout.slots, np.arange(len(WHOLE[model])))
-    np.testing.assert_array_equal(layout.places, layout.slots)
-    assert layout.original.all()
+        assert mesh.rays.T.flags.c_contiguous
 
 
 @for_all_models
@@ -288,7 +255,7 @@ def test_feeds_have_the_colors_on_screen_and_change_none_of_what_they_take(model
     """The network's inputs are contiguous, of the types that its file asks for, and in range whatever is on screen."""
     random = np.random.default_rng(2)
     arranged = choose_layout(WHOLE[model], manifest_of(model))
-    m = len(arranged)
+    m = len(WHOLE[model])
     on_screen = random.random(m) < 0.7
     colors = random.random((3, m), dtype=np.float32)
     before = colors.copy()

@@ -14,6 +14,7 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.network.example import SelfTest
 from vm_embedded.network.manifest import (
     EDGES,
     FORMAT_VERSION,
@@ -21,7 +22,6 @@ from vm_embedded.network.manifest import (
     Manifest,
     ObjectClass,
 )
-from vm_embedded.network.self_test import SelfTest
 
 from ..strategies import attempt, class_names, printable, reals, seeds
 

@@ -37,7 +37,7 @@ ARRAYS = ("points", "neighbors", "labels", "distances", "pixels", "cells")
 
 
 def manifest(**changes):
-    entries = {"intersections": 3.0, "mesh": "octaves", "layout": "canvas", "max_distance": 6.0} | changes
+    entries = {"intersections": 3.0, "mesh": "octaves", "max_distance": 6.0} | changes
     return ball_manifest("ball", "other", **entries)
 
 
@@ -114,15 +114,13 @@ def test_the_network_of_a_training_answers_as_on_the_robot(network, colors):
     shown, facts = picture(), manifest(colors=colors)
     graph = graph_of(shown, facts)
     mesh = facts.model.build(facts.mesh_shape, 1.0, facts.intersections, facts.max_distance)
-    seen = project(mesh, shown.orientation.level, shown.fitted_lens, SIZE).visible.graph
-    layout = choose_layout(seen, facts)
-    on_screen = layout.slots < len(seen)
-    point_of = np.full(len(seen) + 1, -1)
-    point_of[np.flatnonzero(np.isin(seen.strips, seen.strips[~seen.margin]))] = np.arange(len(graph))
-    feeds = layout.feeds(graph.points[point_of[layout.slots]].T.copy(), on_screen)
+    seen = project(mesh, shown.orientation.level, shown.fitted_lens, SIZE)
+    seen = seen.only(mesh.needed(seen.on_screen)).visible
+    layout = choose_layout(seen.graph, facts)
+    feeds = layout.feeds(np.stack([layout.spread(each) for each in graph.points[:-1].T]), seen.on_screen)
     with torch.inference_mode():
         logits = network.canvas_logits(*(torch.from_numpy(feeds[name]) for name in ("points", "shown")))
-    found = logits[0].flatten(1).T.softmax(dim=1).numpy()[layout.places]
+    found = layout.read(logits.softmax(dim=1).numpy(), seen.answered)
     np.testing.assert_allclose(found, answers(network, graph)[graph.counted], atol=1e-6)
 
 

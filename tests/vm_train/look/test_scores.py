@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_train.look.judging import shown_before
 from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchSet
 from vm_train.look.scores import LookScore, result_in_words, result_values
+from vm_train.look.validation import shown_before
 from vm_train.scores.calibration import BINS, Calibration, Reliability
 from vm_train.scores.object_ranking import Ranking
 

@@ -17,7 +17,7 @@ from vm_embedded.network.bundled import model_path
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.evaluation.answers import load_subject
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED, label_places, true_bases
-from vm_train.look.places import Places
+from vm_train.look.places import PatchPlaces
 from vm_train.truth.field import FieldScene, Standing
 
 RADIUS = 0.3
@@ -31,7 +31,7 @@ GRAYS = {"ball": 200, "goal": 240, "line": 250, "field": 90, "robot": 30, "envir
 def view():
     """The view of the drawn field, with circles around bases."""
     subject = load_subject(model_path("soccer"), Settings())
-    return around_bases(subject.observe(picture()), RADIUS).view
+    return around_bases(subject.observe(picture()), RADIUS)
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def test_truths_are_bases_on_the_plane_with_their_visibility_and_width(view, pos
 
 def test_places_beside_a_base_learn_its_shift_and_its_width(view, posts):
     beside = posts.centers[1] + (0.0, 0.2, 0.0)
-    found = label_places(Places.of(beside[None]).tangents(view), posts)
+    found = label_places(PatchPlaces.of(beside[None]).tangents(view), posts)
     assert found.labels.tolist() == [OBJECT]
     assert found.of.tolist() == [1]
     assert found.targets[0, 0] == pytest.approx(0.2 / RADIUS, abs=0.1)  # to the right, back to the base
@@ -62,17 +62,17 @@ def test_places_beside_a_base_learn_its_shift_and_its_width(view, posts):
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
 def test_in_a_patch_that_is_cut_larger_an_upright_is_narrower(view, posts, factor):
-    places = Places(posts.centers[1:2], np.array([factor]))
+    places = PatchPlaces(posts.centers[1:2], np.array([factor]))
     target = label_places(places.tangents(view), posts).targets[0, 2]
     assert target == pytest.approx(posts.sizes[1] - np.log(factor), abs=1e-4)
 
 
 def test_places_far_from_bases_show_nothing_and_those_at_hidden_ones_are_left_out(view, posts):
-    far = label_places(Places.of(posts.centers[1:2] + np.array([0.0, 0.6, 0.0])).tangents(view), posts)
+    far = label_places(PatchPlaces.of(posts.centers[1:2] + np.array([0.0, 0.6, 0.0])).tangents(view), posts)
     assert far.labels.tolist() == [NOTHING]
     assert far.targets.tolist() == [[0.0, 0.0, 0.0]]
     robots = true_bases(picture(), SCENE, CLASSES, view, "robot")
-    hidden = label_places(Places.of(robots.centers[1:]).tangents(view), robots)
+    hidden = label_places(PatchPlaces.of(robots.centers[1:]).tangents(view), robots)
     assert hidden.labels.tolist() == [UNLABELED]
 
 
