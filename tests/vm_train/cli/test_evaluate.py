@@ -14,6 +14,7 @@ import cv2
 import pytest
 
 from tests.folders import contents
+from tests.looks import look_contract
 from tests.programs import BIN, heed_interrupts, run_program
 from tests.vm_export.looks import look_checkpoint
 from vm_embedded.network.bundled import model_path
@@ -115,10 +116,10 @@ def test_a_close_look_s_proposals_have_scores_of_their_own(capsys, looking, data
     page = (out / "report.html").read_text()
     assert "<h2>Proposals for class ball</h2>" in page
     scores = json.loads((out / "scores.json").read_text())
-    assert scores["about"]["model"]["close_look"].startswith("ball, 8 x 8 samples")
+    assert scores["about"]["model"]["close look at ball"].startswith("8 x 8 samples")
     found = scores["proposals"]["ball"]
     assert found["pictures"] == 8
-    assert 0.0 < found["mean_count"] <= found["largest_count"] <= 7
+    assert 0.0 < found["mean_count"] <= found["largest_count"] <= look_contract().max_proposals
     assert found["all"]["truths"] == scores["objects"]["ball"]["iou_0.5"]["all"]["truths"]
     with (out / "proposals.csv").open() as file:
         rows = {row["distance"]: row for row in csv.DictReader(file)}
