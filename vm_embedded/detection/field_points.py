@@ -57,12 +57,12 @@ def ground_points(observation: Observation) -> GroundPoints:
     classes = observation.manifest.classes
     names = [each.name for each in classes]
     signs = [-1.0 if each.kind == "background" else float(each.name in ("field", "line")) for each in classes]
-    values = np.fmax(observation.slot_probabilities.T, 0.0)  # one NaN would spoil the sums of all others
+    probabilities = observation.slot_probabilities.T
     return GroundPoints(
         map=ground,
         shown=observation.projected.on_screen,
-        line=values[names.index("line")] if "line" in names else np.zeros(len(layout), np.float32),
-        inside=np.array(signs, dtype=np.float32) @ values if "field" in names else None,
+        line=probabilities[names.index("line")] if "line" in names else np.zeros(len(layout), np.float32),
+        inside=np.array(signs, dtype=np.float32) @ probabilities if "field" in names else None,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
         heading=view.heading[:2, :2],
