@@ -18,6 +18,7 @@ from itertools import product
 from pathlib import Path
 
 from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
+from vm_embedded.detection.at_peaks import judge_classes
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.settings import Settings
@@ -56,7 +57,8 @@ def scored(pictures: list[tuple[list[TrueObject], Observation]], settings: Setti
     """Scores of all pictures with some settings."""
     scores = ObjectScores(min_radius=2.0)
     for truths, observation in pictures:
-        found, _ = locate(observation, {}, settings, Stopwatch())
+        watch = Stopwatch()
+        found, _ = locate(observation, judge_classes(observation, {}, settings, watch, uprights=False), settings, watch)
         scores.add(truths, found)
     return scores
 

@@ -148,12 +148,12 @@ edit(
 edit("tests/test_docs.py", ('r" > |, |\\+", order', 'r" > |, ", order'))
 design = Path("docs/design.md")
 text = design.read_text()
-text = re.sub(r"^\| `borders` \|.*\n", "", text, flags=re.M)
+text = re.sub(r"^\| `borders` \|.*\n", "", text, flags=re.MULTILINE)
 text = re.sub(
     r"^\| `files`, `errors`, `arrays` \|.*$",
     "| `base` | what all layers share: errors, array types, files, text, sockets, and what every program does |",
     text,
-    flags=re.M,
+    flags=re.MULTILINE,
 )
 design.write_text(text)
 edit(

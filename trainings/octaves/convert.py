@@ -6,6 +6,7 @@
 """
 
 import argparse
+
 import torch
 
 parser = argparse.ArgumentParser(description=__doc__)

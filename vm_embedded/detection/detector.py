@@ -12,6 +12,7 @@ from ..network.bundled import model_path
 from ..network.close_look import CloseLook
 from ..network.model_file import ModelFile, read_model
 from ..network.session import Session
+from .at_peaks import judge_classes
 from .cache import MeshCache
 from .detections import Detections
 from .field_points import locate_features
@@ -107,9 +108,10 @@ class Detector:
         The result keeps the frame in memory. Raises ModelError if the close look does not run.
         """
         watch = Stopwatch()
-        found, rejected = locate(observation, self.looks, self.settings, watch, explain)
         is_wanted = self.settings.field_features
-        features = locate_features(observation, self.looks, self.settings) if is_wanted else None
+        judged = judge_classes(observation, self.looks, self.settings, watch, explain, is_wanted)
+        found, rejected = locate(observation, judged, self.settings, watch, explain)
+        features = locate_features(observation, judged) if is_wanted else None
         if features is not None:
             watch.lap("field")
         timing = {**observation.timing_ms, **watch.stages}

@@ -2,49 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..field.features import FieldFeatures, Upright
+from ..field.features import FieldFeatures
 from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundMap, GroundPoints, ground_map
 from ..mesh.mesh import Mesh
-from .looking import Look
+from .at_peaks import Judged
 from .observation import Observation
 from .profiles import brightness_along
-from .settings import Settings
-from .upright_bases import find_uprights
+from .upright_bases import uprights_at
 
 _MAPS: WeakKeyDictionary[Mesh, GroundMap] = WeakKeyDictionary()
 """Where the rays of meshes meet the plane, as long as a cache keeps these."""
 
 
-def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
+def locate_features(observation: Observation, judged: Judged) -> FieldFeatures | None:
     """Goal posts, robots, lines and border; None if the network has no class for any of them.
 
-    looks: look networks by class. Only a network with peaks for them shows posts and robots. Raises ModelError if a
-    look network does not run.
+    judged: what is at the peaks; only a network with peaks for them shows posts and robots.
     """
     names = [each.name for each in observation.manifest.classes]
     if not set(ROLES) & set(names):
         return None
     view, pyramid = observation.view, observation.pyramid
-
-    def uprights(name: str) -> tuple[Upright, ...]:
-        look = looks.get(name)
-        best = observation.peaks[name].part(slice(1)) if name in observation.manifest.peaks else ()
-        if not best or (look is None and best.probabilities[0] < settings.min_confidence):
-            return ()
-        return find_uprights(observation, name, look, settings)
-
+    posts, robots = (
+        uprights_at(name, judged[name][0].view, judged[name][1]) if name in judged else () for name in ("goal", "robot")
+    )
     return find_features(
         ground_points(observation),
         view.picture_pixels,
         lambda stretches, count: brightness_along(view, pyramid, stretches, count),
-        uprights("goal"),
-        uprights("robot"),
+        posts,
+        robots,
     )
 
 

@@ -7,6 +7,7 @@ probable the object is, where its center is, and how large it is. Then it may lo
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,8 +18,9 @@ from ..network.look_contract import LookContract
 from .judging import repeated
 from .observation import Observation
 from .peaks import LARGEST_SIZE, Peaks, probability_of
-from .places import Places, PlanePlaces, mean_center
+from .places import Places, PlanePlaces, cut_together, mean_center
 from .prepared_view import PreparedView
+from .pyramid import Pyramid
 from .settings import Settings
 from .stopwatch import Stopwatch
 
@@ -54,36 +56,61 @@ class Judgment:
     reason: str | None = None
 
 
-def judge_peaks(
-    observation: Observation,
-    peaks: Peaks,
-    look: Look | None,
-    settings: Settings,
-    watch: Stopwatch,
-    explain: bool = False,
-) -> list[Judgment]:
-    """The objects at the peaks of a class, most probable first.
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """Objects of a class, which are sought at peaks.
 
-    look: the look network for the class; it judges the best peaks. Their scores, times its `mesh_weight`, count in the
-    probabilities, wherever the look moves them. Without it, the peaks are the objects. explain: also the rejected ones,
-    with their reasons. watch: gets the stages propose, and with a look look. Raises ModelError if the look network does
-    not run.
+    view: of objects of their class. peaks: best first. look: the look network for the class; it judges the best peaks.
+    Without it, the peaks are the objects.
     """
-    view = observation.view
-    if look is None:
-        centers = view.shape.center_along(peaks.rays, view.height)
-        sizes = peaks.log_sizes + math.log(observation.manifest.radius / view.shape.radius)
-        answers = np.column_stack([peaks.probabilities, np.zeros((len(peaks), 2)), sizes]).astype(np.float32)
-        watch.lap("propose")
-        return _judged(view, centers, answers, settings, explain)
-    peaks = peaks.part(slice(look.contract.max_proposals))
-    places = PlanePlaces(observation, view.shape.center_along(peaks.rays, view.height))
+
+    view: PreparedView
+    peaks: Peaks
+    look: Look | None
+
+    @property
+    def best(self) -> Peaks:
+        """The peaks that may be objects."""
+        return self.peaks if self.look is None else self.peaks.part(slice(self.look.contract.max_proposals))
+
+    def places(self, pyramid: Pyramid) -> PlanePlaces:
+        """The places of the best peaks."""
+        return PlanePlaces(pyramid, self.view, self.view.shape.center_along(self.best.rays, self.view.height))
+
+    def answers(self, places: PlanePlaces, radius: float) -> Singles:
+        """Answers (n, 4) to the places of the best peaks, as `Look.run` gives them.
+
+        radius: of the object that the network's mesh is made for [m]. Raises ModelError if the look does not run.
+        """
+        peaks = self.best
+        if self.look is None:
+            sizes = peaks.log_sizes + math.log(radius / self.view.shape.radius)
+            return np.column_stack([peaks.probabilities, np.zeros((len(peaks), 2)), sizes]).astype(np.float32)
+        answers, weight = look_at(places, self.look), self.look.contract.mesh_weight
+        if weight:
+            answers[:, 0] = probability_of(_log_odds(answers[:, 0]) + weight * peaks.scores)
+        return answers
+
+
+def judge_peaks(
+    observation: Observation, sought: Sequence[Sought], settings: Settings, watch: Stopwatch, explain: bool = False
+) -> list[list[Judgment]]:
+    """The objects of each class at its peaks, most probable first.
+
+    The scores of the peaks, times the look's `mesh_weight`, count in the probabilities, wherever the look moves them.
+    explain: also the rejected ones, with their reasons. watch: gets the stages propose, and with a look look. Raises
+    ModelError if a look network does not run.
+    """
+    places = [each.places(observation.pyramid) for each in sought]
     watch.lap("propose")
-    answers = look_at(places, look)
-    if look.contract.mesh_weight:
-        answers[:, 0] = probability_of(_log_odds(answers[:, 0]) + look.contract.mesh_weight * peaks.scores)
-    judged = _judged(view, places.centers, answers, settings, explain)
-    watch.lap("look")
+    looks = {number: each.look.contract for number, each in enumerate(sought) if each.look is not None}
+    cut_together(observation.pyramid, [places[number] for number in looks], list(looks.values()))
+    judged = []
+    for each, where in zip(sought, places, strict=True):
+        answers = each.answers(where, observation.manifest.radius)
+        judged.append(_judged(each.view, where.centers, answers, settings, explain))
+    if looks:
+        watch.lap("look")
     return judged
 
 

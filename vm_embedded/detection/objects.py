@@ -8,17 +8,17 @@ likely points are candidates, and their points decide: propose, fit, judge (`can
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import cv2
 import numpy as np
 
 from ..arrays import Floats, Singles
+from .at_peaks import Judged
 from .candidates import Candidate, propose
 from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
-from .looking import Judgment, Look, judge_peaks
+from .looking import Judgment
 from .observation import Observation
 from .projection import along
 from .settings import Settings
@@ -30,16 +30,11 @@ expected one by at most this share."""
 
 
 def locate(
-    observation: Observation,
-    looks: Mapping[str, Look],
-    settings: Settings,
-    watch: Stopwatch,
-    explain: bool = False,
+    observation: Observation, judged: Judged, settings: Settings, watch: Stopwatch, explain: bool = False
 ) -> tuple[tuple[Detection, ...], tuple[Detection, ...]]:
     """The objects that an observation shows, most confident first, and, with `explain`, the rejected candidates.
 
-    It searches only for classes of the kind "object". looks: look networks by class. watch: gets the stage cluster;
-    with peaks also propose, with a look look. Raises ModelError if a look network does not run.
+    It searches only for classes of the kind "object". judged: what is at the peaks. watch: gets the stage cluster.
     """
     objects: list[Detection] = []
     rejected: list[Detection] = []
@@ -47,9 +42,8 @@ def locate(
         name = object_class.name
         if object_class.kind != "object":
             continue
-        if name in observation.manifest.peaks:
-            judged = judge_peaks(observation, observation.peaks[name], looks.get(name), settings, watch, explain)
-            found = [_describe_judgment(observation, name, each) for each in judged]
+        if name in judged:
+            found = [_describe_judgment(observation, name, each) for each in judged[name][1]]
         else:
             candidates = _candidates(observation, name, probabilities, settings)
             found = [_describe_candidate(observation, each) for each in candidates if explain or each.reason is None]

@@ -9,12 +9,12 @@ paper's constant sample density, one level deeper.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import cv2
 import numpy as np
 
-from ..arrays import Chosen, Floats, Image, Singles
+from ..arrays import Chosen, Floats, Image, Number, Singles
 from .prepared_view import PreparedView
 from .pyramid import Pyramid
 
@@ -38,7 +38,12 @@ class Tangents:
 
     @classmethod
     def at(cls, view: PreparedView, centers: Floats) -> Tangents:
-        """The planes for objects with centers (c, 3) [m], relative to the camera in the mesh frame."""
+        """The planes for objects of a view with centers (c, 3) [m], relative to the camera in the mesh frame."""
+        return cls.around(centers, view.shape.half_size)
+
+    @classmethod
+    def around(cls, centers: Floats, size: Number) -> Tangents:
+        """The same for objects whose longest sides are twice `size`: a number, or (c,) [m]."""
         distance = np.linalg.norm(centers, axis=1)
         axes = centers / distance[:, None]
         x, y, z = axes.T
@@ -51,7 +56,6 @@ class Tangents:
         right_y = right[:, 1] = np.where(below, -1.0, -x / length)
         down[:, 0], down[:, 1], down[:, 2] = -z * right_y, z * right_x, x * right_y - y * right_x  # axes x right
         # The camera may be inside of the object, where no tangent exists.
-        size = view.shape.half_size
         radius = size / np.sqrt(np.maximum(distance**2 - size**2, 1e-12))
         return cls(axes, right, down, radius)
 
@@ -71,21 +75,21 @@ class Tangents:
         return np.asarray(rays)
 
 
-def patch_nodes(view: PreparedView, tangents: Tangents, extent: float) -> Singles:
+def patch_nodes(view: PreparedView, tangents: Tangents, extent: Number) -> Singles:
     """Pixels (2, c, N, N), x and y, of a grid over patches in these planes.
 
-    extent: half the side of a patch, in expected radii. The grid goes from border to border, row by row from the upper
-    left. A ray outside of the lens's view is moved to the edge of the view.
+    extent: half the side of a patch, in expected radii; a number, or (c,). The grid goes from border to border, row by
+    row from the upper left. A ray outside of the lens's view is moved to the edge of the view.
     """
-    rays = tangents.turned(view.rotation).rays(*_node_places(extent))  # (N * N, c, 3)
+    rays = tangents.turned(view.rotation).rays(*(each * extent for each in _node_places()))  # (N * N, c, 3)
     pixels = view.lens.project(_in_view(rays.reshape(-1, 3), view.lens.limit), view.size)
     return pixels.astype(np.float32).reshape(_NODES, _NODES, -1, 2).transpose(3, 2, 0, 1)
 
 
-@lru_cache(maxsize=32)
-def _node_places(extent: float) -> tuple[Floats, Floats]:
-    """How far to the right and down (N * N, 1) the nodes of a patch are [expected radii]."""
-    steps = np.linspace(-extent, extent, _NODES)
+@cache
+def _node_places() -> tuple[Floats, Floats]:
+    """How far to the right and down (N * N, 1) the nodes of a patch are, in halves of its side."""
+    steps = np.linspace(-1.0, 1.0, _NODES)
     down, right = np.meshgrid(steps, steps, indexing="ij")
     return right.reshape(-1, 1), down.reshape(-1, 1)
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 
 from ..arrays import Chosen, Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
-from .observation import Observation
 from .patches import Tangents, cut_patches, patch_nodes
 from .prepared_view import PreparedView
+from .pyramid import Pyramid
 
 _NEAR = 0.3
 """Places within this share of an object's radius around its center were meant to be its center."""
@@ -31,36 +32,60 @@ class Places(Protocol):
 class PlanePlaces:
     """Places on the plane that a camera of known lens and pose sees.
 
-    centers (n, 3): of the objects that are expected there, relative to the camera in the mesh frame [m]; a copy is
-    moved.
+    view: of the objects that are expected there. centers (n, 3): of these, relative to the camera in the mesh frame
+    [m]; a copy is moved.
     """
 
-    def __init__(self, observation: Observation, centers: Floats) -> None:
-        self.centers = centers.copy()
-        self._observation = observation
+    def __init__(self, pyramid: Pyramid, view: PreparedView, centers: Floats) -> None:
+        self.view, self.centers = view, centers.copy()
+        self._pyramid = pyramid
         self._tangents: Tangents | None = None  # of all places, until one moves
+        self._patches: Image | None = None  # the same
 
     def __len__(self) -> int:
         return len(self.centers)
 
     def cut(self, rows: Chosen, contract: LookContract) -> Image:
         """See Places."""
-        nodes = patch_nodes(self._observation.view, self._planes(rows), contract.extent)
-        return cut_patches(self._observation.pyramid, nodes, contract.size)
+        if self._patches is not None:
+            return self._patches[rows]
+        nodes = patch_nodes(self.view, self._planes(rows), contract.extent)
+        return cut_patches(self._pyramid, nodes, contract.size)
 
     def move(self, rows: Chosen, right: Floats, down: Floats) -> Mask:
         """See Places. A place that moves to the horizon or above it can't hold an object."""
-        view = self._observation.view
         rays = self._planes(rows).rays(right, down)
-        self.centers[rows] = view.shape.center_along(rays, view.height)
-        self._tangents = None
+        self.centers[rows] = self.view.shape.center_along(rays, self.view.height)
+        self._tangents = self._patches = None
         return np.asarray(rays[:, 2] < 0.0)
+
+    def keep(self, tangents: Tangents, patches: Image) -> None:
+        """Use these planes and patches until a place moves."""
+        self._tangents, self._patches = tangents, patches
 
     def _planes(self, rows: Chosen) -> Tangents:
         """The planes of the patches around places with the numbers `rows` (k,)."""
         if self._tangents is None:
-            self._tangents = Tangents.at(self._observation.view, self.centers)
+            self._tangents = Tangents.at(self.view, self.centers)
         return self._tangents.part(rows)
+
+
+def cut_together(pyramid: Pyramid, places: Sequence[PlanePlaces], contracts: Sequence[LookContract]) -> None:
+    """Cut the patches of all places at once, each as its contract describes it, which takes half the time.
+
+    All places are of one camera.
+    """
+    if len(places) < 2 or len({each.size for each in contracts}) > 1:
+        return
+    counts = [len(each) for each in places]
+    sizes = np.repeat([each.view.shape.half_size for each in places], counts)
+    tangents = Tangents.around(np.concatenate([each.centers for each in places]), sizes)
+    nodes = patch_nodes(places[0].view, tangents, np.repeat([each.extent for each in contracts], counts))
+    patches = cut_patches(pyramid, nodes, contracts[0].size)
+    ends = np.cumsum(counts).tolist()
+    for each, end in zip(places, ends, strict=True):
+        rows = np.arange(end - len(each), end)
+        each.keep(tangents.part(rows), patches[rows])
 
 
 def mean_center(view: PreparedView, centers: Floats, probabilities: Singles, number: int) -> Floats:

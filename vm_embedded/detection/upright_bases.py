@@ -7,42 +7,38 @@ patch shows the base in its middle, the ground around it, and the lower part of 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ..field.features import UPRIGHTS, Upright
 from ..geometry.circle import Circle
-from .looking import Look, judge_peaks
+from .looking import Judgment, Look, Sought
 from .observation import Observation
 from .peaks import first_apart
-from .settings import Settings
-from .stopwatch import Stopwatch
+from .prepared_view import PreparedView
 
 _SAME = 0.12
 """Two bases nearer to each other than this share of their distance are those of one thing: far away, a small error in
 the picture is a large one on the plane."""
 
 
-def around_bases(observation: Observation, radius: float) -> Observation:
+def around_bases(observation: Observation, radius: float) -> PreparedView:
     """The same points, where circles on the plane with this radius [m] are sought: one around each base."""
-    return replace(observation, view=observation.view._replace(shape=Circle(radius)))
+    return observation.view._replace(shape=Circle(radius))
 
 
-def find_uprights(
-    observation: Observation, class_name: str, look: Look | None, settings: Settings
-) -> tuple[Upright, ...]:
-    """The uprights of a class that the network has peaks for, nearest first.
-
-    look: the look network for the class, if there is one. Raises ModelError if it does not run.
-    """
-    view = observation.view
+def sought_bases(observation: Observation, class_name: str, look: Look | None) -> Sought:
+    """The bases of uprights of a class that the network has peaks for. look: the look network for the class, if any."""
     radius = observation.manifest.radius if look is None else look.contract.upright_radius
-    circles = around_bases(observation, radius)
-    peaks = observation.peaks[class_name].apart(circles.view)
-    judged = judge_peaks(circles, peaks, look, settings, Stopwatch())
+    view = around_bases(observation, radius)
+    return Sought(view, observation.peaks[class_name].apart(view), look)
+
+
+def uprights_at(class_name: str, view: PreparedView, judged: Sequence[Judgment]) -> tuple[Upright, ...]:
+    """The uprights of a class that were judged to be there, nearest first. view: see `around_bases`."""
+    judged = [each for each in judged if each.reason is None]
     centers = np.array([each.center for each in judged]).reshape(-1, 3) @ view.heading.T
-    widths = [2.0 * radius * each.scale for each in judged]
+    widths = [2.0 * view.shape.radius * each.scale for each in judged]
     pixels = view.picture_pixels(centers[:, :2])
     found = []
     for center, width, pixel, each in zip(centers, widths, pixels, judged, strict=True):
@@ -50,7 +46,7 @@ def find_uprights(
         found.append(
             Upright(UPRIGHTS[class_name], each.confidence, center[:2], distance, center / distance, pixel, width)
         )
-    return apart(found)
+    return apart(found) if len(found) > 1 else tuple(found)
 
 
 def apart(uprights: Sequence[Upright]) -> tuple[Upright, ...]:

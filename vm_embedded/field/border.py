@@ -65,10 +65,11 @@ def _ends_of_field(points: GroundPoints) -> tuple[list[complex], list[bool]]:
     and -1, from near to far, it is behind the second one.
     """
     ground = points.map
-    shown = np.flatnonzero(points.shown[ground.by_column])
+    shown = points.shown.take(ground.by_column).nonzero()[0]
     if points.inside is None or not len(shown):
         return [], []
-    values = points.inside[ground.by_column[shown]]
+    values = points.inside.take(ground.by_column.take(shown))
+    values[np.isnan(values)] = 0.0  # one NaN would spoil the sums of all others
     sums = np.cumsum(values, dtype=np.float64)
     bounds = np.searchsorted(shown, ground.bounds)
     counts = bounds[1:] - bounds[:-1]

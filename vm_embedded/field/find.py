@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Singles
 from .border import find_border
 from .circle import CirclePoints, find_circle
-from .crossings import find_crossings
+from .crossings import certain_crossings, possible_crossings
 from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
 from .goals import pair_posts
 from .ground_points import GroundPoints, starts_of_runs
@@ -41,16 +41,18 @@ def find_features(
     profiles: brightness of the frame across lines. posts, robots: what stands on the plane.
     """
     near = line_points(points)
-    likely = near.part(np.flatnonzero(near.weights > LEAST))
+    likely = near.part((near.weights > LEAST).nonzero()[0])
     pieces, circle = _straight_and_round(near, likely)
     pieces = pieces_on_ridges(pieces, points, profiles)
+    confidences = [float(likely.weights.take(each.members).sum()) / len(each.members) for each in pieces]
+    crossings = possible_crossings(pieces, confidences)
+    behind = np.array([each for _, *both in crossings for each in both], dtype=np.complex128)
     border = find_border(points)
     ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
-    end_pixels, border_pixels = np.split(to_pixels(np.concatenate([ends, border])), [len(ends)])  # faster at once
-    lines = tuple(
-        Segment(piece.ends, pixels, float(likely.weights[piece.members].sum()) / len(piece.members))
-        for piece, pixels in zip(pieces, end_pixels.reshape(-1, 2, 2), strict=True)
-    )
+    places = np.concatenate([ends, border, behind.view(np.float64).reshape(-1, 2)])
+    pixels = to_pixels(places)  # faster at once
+    shown = np.isfinite(pixels[len(ends) + len(border) :, 0]).reshape(-1, 2)
+    lines = tuple(map(Segment, ends.reshape(-1, 2, 2), pixels[: len(ends)].reshape(-1, 2, 2), confidences))
     thinned, confidences = _thinned(likely)
     return FieldFeatures(
         posts=posts,
@@ -58,10 +60,10 @@ def find_features(
         robots=robots,
         lines=lines,
         circle=None if circle is None else _circle(circle, likely),
-        crossings=find_crossings(lines, lambda places: np.asarray(np.isfinite(to_pixels(places)).all(axis=1))),
+        crossings=certain_crossings([each for each, *_ in crossings], shown.all(axis=1).tolist()),
         line_points=thinned,
         line_confidences=confidences,
-        border=Border(border, border_pixels) if len(border) else None,
+        border=Border(border, pixels[len(ends) : len(ends) + len(border)]) if len(border) else None,
     )
 
 
@@ -89,11 +91,9 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     """Mean places (p, 2) [m] and probabilities (p,) of the line points in each square."""
     if not len(points):
         return np.empty((0, 2)), np.empty(0, np.float32)
-    cells = np.array([1024.0, 1.0]) @ np.floor(
-        points.positions * (1.0 / _CELL)
-    )  # points of a square have the same number
-    order = np.argsort(cells)
-    starts = starts_of_runs(cells[order])
-    columns = np.array([*points.positions, points.weights])[:, order]
-    x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
+    cells = np.array([1024.0, 1.0]) @ np.floor(points.positions * (1.0 / _CELL))  # those of a square are the same
+    order = cells.argsort()
+    columns = np.array([*points.positions, points.weights, np.ones(len(points))]).take(order, axis=1)
+    sums = np.add.reduceat(columns, starts_of_runs(cells.take(order)), axis=1)
+    x, y, weights = sums[:3] / sums[3]
     return np.array([x, y]).T, weights.astype(np.float32)

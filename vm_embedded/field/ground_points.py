@@ -44,11 +44,11 @@ class GroundMap:
     directions: npt.NDArray[np.complex128]
 
 
-def ground_map(rays: Floats, numbers: Chosen) -> GroundMap:
+def ground_map(rays: Floats, numbers: npt.NDArray[np.integer]) -> GroundMap:
     """The map of rays (m, 3) that point downward, of those with these numbers."""
     upward = rays[numbers, 2]
     order = np.argsort(upward, kind="stable")
-    numbers = numbers[order[: np.searchsorted(upward[order], -_LOWEST)]]
+    numbers = numbers[order[: np.searchsorted(upward[order], -_LOWEST)]].astype(np.intp)
     x, y, z = rays[numbers].T
     places = np.array([x, y]) / -z
     ranges = np.hypot(*places)

@@ -84,9 +84,11 @@ class LinePoints:
     def __len__(self) -> int:
         return len(self.weights)
 
-    def part(self, chosen: Chosen | slice) -> LinePoints:
+    def part(self, chosen: Chosen) -> LinePoints:
         """Some of the points."""
-        return LinePoints(self.positions[:, chosen], self.weights[chosen], self.leaning[chosen], self.ground)
+        return LinePoints(
+            self.positions.take(chosen, axis=1), self.weights.take(chosen), self.leaning.take(chosen), self.ground
+        )
 
 
 def tolerance(offsets: AnyFloats, leaning: AnyFloats, ground: GroundPoints) -> AnyFloats:
@@ -113,11 +115,12 @@ def line_points(points: GroundPoints) -> LinePoints:
     """All points near enough for lines."""
     ground, height = points.map, points.height
     first, end = np.searchsorted(ground.ranges, (1e-3 / height, _FARTHEST / height)).tolist()
-    near = np.flatnonzero(points.shown[ground.numbers[first:end]]) + first
+    near = points.shown.take(ground.numbers[first:end]).nonzero()[0]
+    near += first
     return LinePoints(
-        (height * points.heading) @ ground.places[:, near],
-        points.line[ground.numbers[near]],
-        ground.leaning[near],
+        (height * points.heading) @ ground.places.take(near, axis=1),  # take is much faster than an index here
+        np.fmax(points.line.take(ground.numbers.take(near)), np.float32(0.0)),  # 0 for NaN
+        ground.leaning.take(near),
         points,
     )
 
@@ -149,21 +152,22 @@ _TRIED = np.arange(_ANGLES, dtype=np.float64) * (0.5 * math.pi / _ANGLES)
 _NORMALS = _normals(_TRIED).reshape(-1, 2).astype(np.float32)
 
 
-def _bins(offsets: AnyFloats) -> Chosen:
-    """Bins (r, n) of lines at these distances (r, n) [m] from the camera: finer for near lines. Each row has its
-    own bins."""
-    steps = (offsets * (1.0 / _STEP) + (_CENTER + 0.5)).astype(np.intp)
-    bins = _BINS.take(steps)
-    bins += np.arange(0, _COUNT * len(offsets), _COUNT)[:, None]
+def _bins(normals: AnyFloats, places: AnyFloats) -> Chosen:
+    """Bins (r, n) of lines with normals (r, 2) through places (2, n) [m]: by their distances from the camera, finer for
+    near lines. Each row has its own bins."""
+    steps = (normals * (1.0 / _STEP)) @ places
+    steps += _CENTER + 0.5
+    bins = np.asarray(_BINS.take(steps.astype(np.intp)))
+    bins += np.arange(0, _COUNT * len(normals), _COUNT)[:, None]
     return bins
 
 
 def _main_direction(points: LinePoints) -> float:
     """The direction [rad], from 0 to a right angle, in which most points share a line, or at a right angle to it."""
     some = slice(None, None, -(-len(points) // _MOST_VOTERS))
-    bins = _bins(_NORMALS @ points.positions[:, some].astype(np.float32))
-    votes = np.bincount(bins.ravel(), np.tile(points.weights[some], len(bins)), len(bins) * _COUNT)
-    votes = votes.reshape(2, _ANGLES, _COUNT)
+    bins = _bins(_NORMALS, points.positions[:, some].astype(np.float32))
+    weights = np.broadcast_to(points.weights[some].astype(np.float64), bins.shape)
+    votes = np.bincount(bins.ravel(), weights.ravel(), len(bins) * _COUNT).reshape(2, _ANGLES, _COUNT)
     peaks = np.einsum("aij,aij->i", votes, votes)
     best = int(np.argmax(peaks))
     before, most, after = peaks[[best - 1, best, (best + 1) % _ANGLES]].tolist()
@@ -171,12 +175,17 @@ def _main_direction(points: LinePoints) -> float:
     return float(_TRIED[best] + shift * _TRIED[1])
 
 
+_ENDS = np.array([0, 1])
+"""From the numbers of the first and the last to the first and the one behind the last."""
+
+
 class _Line(NamedTuple):
-    """A fitted line: the number of its normal, a point [m], its direction, and the numbers of its likely points."""
+    """A fitted line: the number of its normal, its direction, its distance to the left of the point below the camera
+    [m], and the numbers of its likely points."""
 
     axis: int
-    middle: tuple[float, float]
-    direction: tuple[float, float]
+    direction: complex
+    distance: float
     members: Chosen
 
 
@@ -185,7 +194,7 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
     normal are first."""
     (x, y), count = points.positions, len(points)
     offsets = normals @ points.positions
-    bins, reach = _bins(offsets), tolerance(offsets, points.leaning, points.ground)
+    bins, reach = _bins(normals, points.positions), tolerance(offsets, points.leaning, points.ground)
     moments = np.array([np.ones(count), x, y, x * x, x * y, y * y])
     free = np.empty((4, count))  # weights, twice, and precisions; 0 where not free
     free[:2] = points.weights
@@ -200,24 +209,24 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
             break
         axis = peak // _COUNT
         near = (bins[axis] - peak).view(np.uintp) < 2
-        middle, direction, on = _fit(moments, free[2 + axis], reach[axis], near, normals[axis].tolist())
+        direction, distance, on = _fit(moments, free[2 + axis], reach[axis], near, normals[axis].tolist())
         members = (on & (weights[:count] > 0.0)).nonzero()[0]
         if len(members) >= _FEWEST:
-            lines.append(_Line(axis, middle, direction, members))
+            lines.append(_Line(axis, direction, distance, members))
         free *= ~(on | near)
     return sorted(lines, key=lambda each: each.axis)
 
 
 def _fit(
     moments: Floats, precision: Floats, reach: Floats, near: Mask, normal: Sequence[float]
-) -> tuple[tuple[float, float], tuple[float, float], Mask]:
-    """A point [m] of a line through points with moments (6, n) and precision (n,), its direction, and which points
-    (n,) are on it.
+) -> tuple[complex, float, Mask]:
+    """A line through points with moments (6, n) and precision (n,): its direction, its distance to the left of the
+    point below the camera [m], and which points (n,) are on it.
 
     reach (n,): how far a point may be from the line [m]. near (n,): the points to begin with. normal (2,): the expected
     normal.
     """
-    ex, ey, on = -normal[1], normal[0], near  # the expected direction
+    ex, ey, on, places = -normal[1], normal[0], near, moments[:3]  # the expected direction
     for _ in range(2):
         total, sx, sy, sxx, sxy, syy = (moments @ (precision * on)).tolist()
         if total <= 0.0:
@@ -232,24 +241,20 @@ def _fit(
         kept = turn * certainty / (certainty + 1.0 / _ERROR**2)
         c, s = math.cos(kept), math.sin(kept)
         dx, dy = c * ex - s * ey, s * ex + c * ey
-        on = np.abs(np.array([my * dx - mx * dy, dy, -dx]) @ moments[:3]) < reach
-    return (mx, my), (dx, dy), on
+        distance = my * dx - mx * dy
+        on = np.abs(np.array([distance, dy, -dx]) @ places) < reach
+    return complex(dx, dy), distance, on
 
 
 def _cut(points: LinePoints, normals: Floats, lines: Sequence[_Line]) -> list[Piece]:
     """The pieces of lines that their points speak for. lines: as _find_lines returns them."""
     count, first = len(points), sum(each.axis == 0 for each in lines)
-    middles, directions = np.array([each[1:3] for each in lines]).transpose(1, 0, 2)
-    across = directions[:, ::-1] * (1.0, -1.0)
-    distances = (across * middles).sum(axis=1, keepdims=True)
+    directions, distances = np.array([each[1:3] for each in lines]).T
+    dx, dy = directions.real, directions.imag
     places = np.ones((3, count), dtype=np.float32)
     places[:2] = points.positions
-    both = np.zeros((len(lines), 2, 3), dtype=np.float32)
-    both[:, 0, :2], both[:, :1, 2], both[:, 1, :2] = across, -distances, directions
-    off, along = (
-        both[:, each] @ places for each in (0, 1)
-    )  # [m] from the lines, and from the places next to the camera
-    np.abs(off, out=off)
+    off = np.abs(np.array([dy, -dx, distances.real], dtype=np.float32).T @ places)
+    along = np.array([dx, dy], dtype=np.float32).T @ places[:2]  # [m] from the place next to the camera
     reach = tolerance(normals.astype(np.float32) @ places[:2], points.leaning, points.ground)
     on = np.concatenate([off[:first] < reach[0], off[first:] < reach[1]]).ravel().nonzero()[0]
     line, along = on // count, along.ravel()[on]
@@ -266,8 +271,8 @@ def _cut(points: LinePoints, normals: Floats, lines: Sequence[_Line]) -> list[Pi
     stretches = _best_stretches(values, line, _LEAST_SUPPORT, _MOST_AGAINST)
     spans = np.array([each[:2] for each in stretches], dtype=np.intp).reshape(-1, 2)
     of, reached = line[spans[:, 0]], along[spans].astype(np.float64)
-    ends = (across * distances)[of][:, None] + reached[..., None] * directions[of][:, None]
-    bounds = np.searchsorted(own, spans + np.array([0, 1])).tolist()
+    ends = ((reached + 1j * distances[of, None]) * directions[of, None]).view(np.float64).reshape(-1, 2, 2)
+    bounds = np.searchsorted(own, spans + _ENDS).tolist()
     lengths = (reached[:, 1] - reached[:, 0]).tolist()
     return [
         Piece(its_ends, length, members[start:end], support)

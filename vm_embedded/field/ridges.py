@@ -41,6 +41,12 @@ _SHIFTS = 7
 _TRIED = np.linspace(-1.0, 1.0, _SHIFTS)
 """These places, as shares of how far the ridge may be from the end."""
 
+_BESIDE = np.array([[-1], [0], [1]])
+"""A ridge may weave by a sample."""
+
+_SUM = np.ones(_STATIONS, np.float32)
+_MEAN = np.full(_STATIONS * _SAMPLES, 1.0 / (_STATIONS * _SAMPLES), np.float32)
+
 _TURN = 0.06
 """A piece turns by at most this much [rad]."""
 
@@ -133,7 +139,7 @@ def _contrasts(brightness: Singles, widths: Floats) -> Singles:
     width = np.minimum(np.maximum(np.rint(widths), 1.0), len(_WINDOWS)).astype(np.intp)
     left, ridge, right = (values @ _WINDOWS[width - 1]).reshape(*values.shape[:2], 3, _SAMPLES).transpose(2, 0, 1, 3)
     contrasts = ridge - np.maximum(left, right)
-    contrasts /= (values.mean(axis=(1, 2)) + np.float32(_DARK))[:, None, None]
+    contrasts /= (values.reshape(len(values), -1) @ _MEAN + np.float32(_DARK))[:, None, None]
     contrasts *= shown
     return np.asarray(np.minimum(np.maximum(contrasts, _LIMITS[0]), _LIMITS[1]))
 
@@ -151,16 +157,12 @@ def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Flo
     one, other = farthest[:, :, None] * _TRIED[:, None]  # (p, S, T)
     places = (one[:, :, None] + other[:, None] + (_HALF + 0.5)).astype(np.intp)  # (p, S, S, T)
     places += np.arange(0, contrasts.size, _SAMPLES).reshape(count, 1, 1, _STATIONS)
-    totals = contrasts.take(places) @ np.ones(_STATIONS, np.float32)
+    totals = (contrasts.take(places).reshape(-1, _STATIONS) @ _SUM).reshape(-1, _SHIFTS, _SHIFTS)
     one, other = free.T[:, :, None] * _TRIED  # (p, S): [m]
     totals[np.abs(one[:, :, None] - other[:, None]) > (_TURN * lengths)[:, None, None]] = -np.inf
     best = totals.reshape(count, -1).argmax(axis=1)
     rows = np.arange(count)
-    near = places.reshape(count, -1, _STATIONS)[rows, best][:, None] + [
-        [-1],
-        [0],
-        [1],
-    ]  # (p, 3, T): the ridge may weave
+    near = places.reshape(count, -1, _STATIONS)[rows, best][:, None] + _BESIDE  # (p, 3, T)
     shown = contrasts.take(near, mode="clip").max(axis=1)  # the first and the last sample have the contrast 0
-    shares = np.count_nonzero(shown > _CONTRAST, axis=1) / _STATIONS
+    shares = (shown > _CONTRAST).sum(axis=1) / _STATIONS
     return np.array([one[rows, best // _SHIFTS], other[rows, best % _SHIFTS]]).T, shares

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from ..detection.at_peaks import judge_classes
 from ..detection.detections import Detections
 from ..detection.detector import Detector
 from ..detection.objects import locate
@@ -40,6 +41,8 @@ def with_settings(detector: Detector, detections: Detections, settings: Settings
     Its network does not run again. Use it in the thread of the detector. Raises ModelError if the close look does not
     run.
     """
-    found, rejected = locate(detections.observation, detector.looks, settings, Stopwatch(), explain=True)
+    observation, watch = detections.observation, Stopwatch()
+    judged = judge_classes(observation, detector.looks, settings, watch, explain=True, uprights=False)
+    found, rejected = locate(observation, judged, settings, watch, explain=True)
     near = tuple(each for each in rejected if each.confidence >= _WORTH_SHOWING)
     return replace(detections, objects=found, rejected=near, threshold=settings.threshold)

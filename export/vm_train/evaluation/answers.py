@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from vm_embedded.arrays import Chosen, Floats, Mask, Singles
+from vm_embedded.detection.at_peaks import judge_classes
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
@@ -99,9 +100,10 @@ class ExactSubject:
         found: tuple[Detection, ...] = ()
         features = None
         if self.grid.is_visual:
-            found, _ = locate(observation, self.looks, self.settings, Stopwatch())
             is_wanted = self.settings.field_features
-            features = locate_features(observation, self.looks, self.settings) if is_wanted else None
+            judged = judge_classes(observation, self.looks, self.settings, Stopwatch(), uprights=is_wanted)
+            found, _ = locate(observation, judged, self.settings, Stopwatch())
+            features = locate_features(observation, judged) if is_wanted else None
         return _answer(observation, found, features, self.looks)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:

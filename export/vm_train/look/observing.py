@@ -84,10 +84,9 @@ class Observer:
         observation = self.subject.observe(picture, self._radius(scene))
         manifest, peaks = observation.manifest, observation.peaks[self.object_class]
         if self.kind is not None:
-            circles = around_bases(observation, self.upright_radius)
-            field = read_field(files.scene)
-            peaks = peaks.apart(circles.view)
-            return Observed(circles, peaks, true_bases(picture, field, self.classes.names, circles.view, self.kind))
+            view = around_bases(observation, self.upright_radius)
+            truths = true_bases(picture, read_field(files.scene), self.classes.names, view, self.kind)
+            return Observed(replace(observation, view=view), peaks.apart(view), truths)
         in_masks = replace(self.in_masks, radius=manifest.radius, object_radius=manifest.object_radius)
         return Observed(observation, peaks, find_truths(picture, scene, in_masks, observation.view, self.object_class))
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Mask
-from vm_embedded.detection.looking import judge_peaks
+from vm_embedded.detection.looking import Sought, judge_peaks
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -48,7 +48,8 @@ class Judge:
             seen = self.observer.observe(item.files)
         except (InputError, GeometryError):  # was reported when the patches were collected
             return Ranking.empty()
-        judged = judge_peaks(seen.observation, seen.peaks, self.look, self.settings, Stopwatch())
+        sought = Sought(seen.observation.view, seen.peaks, self.look)
+        (judged,) = judge_peaks(seen.observation, [sought], self.settings, Stopwatch())
         kept = sorted((each for each in judged if each.reason is None), key=lambda each: -each.confidence)
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
         found = label_places(Tangents.at(seen.observation.view, centers), seen.truths)

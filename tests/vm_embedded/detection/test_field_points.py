@@ -69,7 +69,7 @@ def test_places_on_the_plane_have_the_pixels_of_their_points(detector, yaw, roll
 
 @pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
 def test_a_painted_field_has_its_line_and_its_border(detector, yaw):
-    found = locate_features(painted(detector, Orientation.from_roll_pitch(0.8, 0.0, 0.4, yaw)), {}, Settings())
+    found = locate_features(painted(detector, Orientation.from_roll_pitch(0.8, 0.0, 0.4, yaw)), {})
     away = np.array([np.cos(yaw), np.sin(yaw)])
     assert found.lines[0].ends @ away == pytest.approx([2.0, 2.0], abs=0.05)
     assert found.border.points @ away == pytest.approx(np.full(len(found.border.points), 4.0), abs=0.25)
@@ -80,10 +80,7 @@ def test_a_painted_field_has_its_line_and_its_border(detector, yaw):
 
 def test_a_network_without_classes_of_a_field_has_no_features(detector):
     seen = painted(detector, Orientation.from_roll_pitch(0.8, 0.0, 0.4))
-    assert (
-        locate_features(replace(seen, manifest=replace(seen.manifest, classes=SOCCER[:1] + SOCCER[3:])), {}, Settings())
-        is None
-    )
+    assert locate_features(replace(seen, manifest=replace(seen.manifest, classes=SOCCER[:1] + SOCCER[3:])), {}) is None
 
 
 def test_they_can_be_switched_off(detector):
@@ -98,6 +95,6 @@ def test_a_point_without_a_probability_spoils_nothing_else(detector):
     seen = painted(detector, Orientation.from_roll_pitch(0.8, 0.0, 0.4))
     broken = seen.answers.copy()
     broken[:: len(broken) // 7] = np.nan
-    found, whole = (locate_features(each, {}, Settings()) for each in (replace(seen, answers=broken), seen))
+    found, whole = (locate_features(each, {}) for each in (replace(seen, answers=broken), seen))
     assert len(found.border.points) == len(whole.border.points)
     assert found.border.points == pytest.approx(whole.border.points, abs=0.2)

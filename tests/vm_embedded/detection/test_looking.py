@@ -8,15 +8,17 @@ from hypothesis import given
 
 from tests.looks import look_contract
 from tests.manifests import ball_manifest
+from vm_embedded.detection.at_peaks import judge_classes
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.looking import look_at
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation
-from vm_embedded.detection.places import PlanePlaces, mean_center
+from vm_embedded.detection.places import PlanePlaces, cut_together, mean_center
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
+from vm_embedded.detection.upright_bases import around_bases
 from vm_embedded.geometry.orientation import Orientation
 
 from ..strategies import seeds
@@ -51,7 +53,9 @@ class BrightDisk:
 
 def found_in(observation, look, explain=True, **settings):
     watch = Stopwatch()
-    found, rejected = locate(observation, {"ball": look}, Settings(**settings), watch, explain)
+    wanted = Settings(**settings)
+    judged = judge_classes(observation, {"ball": look}, wanted, watch, explain)
+    found, rejected = locate(observation, judged, wanted, watch, explain)
     assert list(watch.stages) == ["propose", "look", "cluster"]
     return found, rejected
 
@@ -71,7 +75,7 @@ def scene():
 
 def looked_at(observation, look, centers):
     """The centers of places after all looks, and the answers."""
-    places = PlanePlaces(observation, centers)
+    places = PlanePlaces(observation.pyramid, observation.view, centers)
     answers = look_at(places, look)
     return places.centers, answers
 
@@ -87,6 +91,24 @@ def test_each_ball_is_found_once_where_it_is_and_as_large_as_it_is(scene):
         assert ball.distances_agree
         assert ball.distance_by_angle == pytest.approx(ball.distance, rel=0.1)
         assert ball.points > 5
+
+
+def test_patches_that_are_cut_together_are_those_of_each_place(scene):
+    contracts = [look_contract(size=16, extent=extent) for extent in (1.6, 0.9)]
+    views = scene.view, around_bases(scene, 0.3)
+    groups = [BALLS, NOTHING]
+
+    def places():
+        return [PlanePlaces(scene.pyramid, view, np.array(each)) for view, each in zip(views, groups, strict=True)]
+
+    together, alone = places(), places()
+    cut_together(scene.pyramid, together, contracts)
+    for one, other, contract in zip(together, alone, contracts, strict=True):
+        rows = np.arange(len(one))[::-1]
+        np.testing.assert_array_equal(one.cut(rows, contract), other.cut(rows, contract))
+        for each in (one, other):
+            each.move(rows[:1], np.full(1, 0.2), np.full(1, -0.1))
+        np.testing.assert_array_equal(one.cut(rows, contract), other.cut(rows, contract))
 
 
 def test_looks_move_to_the_center_even_from_a_place_beside_it(scene):

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from tests.looks import look_contract
 from tests.manifests import ball_manifest
 from vm_embedded.arrays import frozen
+from vm_embedded.detection.at_peaks import judge_classes
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.field_points import locate_features
-from vm_embedded.detection.looking import judge_peaks
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation, observe
 from vm_embedded.detection.prepared_view import PreparedView
@@ -20,7 +20,6 @@ from vm_embedded.detection.projection import Projection, project
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
-from vm_embedded.detection.upright_bases import find_uprights
 from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
@@ -290,17 +289,29 @@ def test_a_peak_of_an_upright_is_its_base(scene, seed):
     assume(is_near(view, cells, ray))
     size = random.uniform(-1.5, 1.5)
     seen = observed(view, manifest, [("goal", ray, size, 5.0)])
-    (base,) = find_uprights(seen, "goal", None, SETTINGS)
+    (base,) = uprights(seen, "goal", {}, SETTINGS)
     place = place_of(view, ray)
     assert np.hypot(*(base.position - place)) < 0.012 * np.hypot(np.hypot(*place), view.height)
     assert base.width == pytest.approx(2.0 * manifest.radius * np.exp(size), rel=1e-5)
     (score,) = seen.peaks["goal"].scores
     assert base.confidence == pytest.approx(1.0 / (1.0 + np.exp(-score)))
-    features = locate_features(seen, {}, SETTINGS)
+    features = locate_features(seen, judge_classes(seen, {}, SETTINGS, Stopwatch()))
     (post,) = features.posts
     assert (post.class_name, post.width, post.confidence) == ("post", base.width, base.confidence)
     np.testing.assert_array_equal(post.position, base.position)
     assert features.robots == ()
+
+
+def uprights(seen, name, looks, settings=SETTINGS):
+    """The posts or robots that are found."""
+    features = locate_features(seen, judge_classes(seen, looks, settings, Stopwatch()))
+    return {"goal": features.posts, "robot": features.robots}[name]
+
+
+def objects(seen, looks, explain=False):
+    """The objects that are found, and the rejected ones."""
+    judged = judge_classes(seen, looks, SETTINGS, Stopwatch(), explain)
+    return locate(seen, judged, SETTINGS, Stopwatch(), explain)
 
 
 def cells_ahead(*distances):
@@ -315,9 +326,9 @@ def test_the_least_confidence_of_the_settings_counts_for_bases():
     near, far = VIEW.mesh.rays[cells_ahead(1.5, 4.0)]
     seen = observed(VIEW, BALLS, [("robot", far, 0.0, 1.0), ("robot", near, 0.0, -0.5)])
     for least, count in ((0.3, 2), (0.5, 1), (0.8, 0)):
-        found = find_uprights(seen, "robot", None, Settings(min_confidence=least))
+        found = uprights(seen, "robot", {}, Settings(min_confidence=least))
         assert len(found) == count
-    both = find_uprights(seen, "robot", None, Settings(min_confidence=0.3))
+    both = uprights(seen, "robot", {}, Settings(min_confidence=0.3))
     assert np.hypot(*both[0].position) < 2.0 < 3.0 < np.hypot(*both[1].position)
 
 
@@ -326,7 +337,7 @@ def test_two_peaks_of_a_wide_upright_are_one_base(width, is_same):
     rays = VIEW.mesh.rays[cells_ahead(2.0, 3.0)]
     size = np.log(width / (2.0 * BALLS.radius))
     seen = observed(VIEW, BALLS, [("robot", rays[0], size, 1.0), ("robot", rays[1], size, 4.0)])
-    found = find_uprights(seen, "robot", None, SETTINGS)
+    found = uprights(seen, "robot", {}, SETTINGS)
     assert len(seen.peaks["robot"]) == 2
     assert len(found) == (1 if is_same else 2)
     assert max(each.confidence for each in found) == pytest.approx(1.0 / (1.0 + np.exp(-4.0)), abs=1e-4)
@@ -340,7 +351,7 @@ def test_a_peak_above_the_horizon_is_no_base():
     answers[[below, above], robot : robot + 4] = 2.0, 0.0, 0.0, 0.0
     seen = Observation(Pyramid(BLACK, "bgr"), view, BALLS, projected, answers)
     assert len(seen.peaks["robot"]) == 2
-    (base,) = find_uprights(seen, "robot", None, SETTINGS)
+    (base,) = uprights(seen, "robot", {})
     np.testing.assert_allclose(base.position, place_of(view, view.mesh.rays[below]))
 
 
@@ -370,7 +381,9 @@ def test_the_look_judges_peaks_and_the_score_counts_as_often_as_its_contract_say
     ray = VIEW.mesh.rays[cell]
     seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score)])
     look = Sure(right, probability, mesh_weight=weight)
-    (judged,) = judge_peaks(seen, seen.peaks["ball"], look, SETTINGS, Stopwatch(), explain=True)
+    ((_, (judged,)),) = judge_classes(
+        seen, {"ball": look}, SETTINGS, Stopwatch(), explain=True, uprights=False
+    ).values()
     moved = offset(VIEW, judged.center / np.linalg.norm(judged.center), ray)
     assert moved == pytest.approx(abs(right), abs=0.02)
     expected = log_odds(np.float64(np.float32(probability))) + weight * score
@@ -383,7 +396,7 @@ def test_each_place_keeps_the_score_of_its_own_peak():
     scores = (1.0, 3.0, 2.0)
     seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score) for ray, score in zip(rays, scores, strict=True)])
     look = Sure(0.2, 0.5, mesh_weight=0.5, passes=2)
-    found, _ = locate(seen, {"ball": look}, SETTINGS, Stopwatch())
+    found, _ = objects(seen, {"ball": look})
     assert len(found) == 3
     assert found[2].distance < found[0].distance < found[1].distance
     for each, score in zip(found, (3.0, 2.0, 1.0), strict=True):
@@ -393,7 +406,7 @@ def test_each_place_keeps_the_score_of_its_own_peak():
 def test_a_look_judges_the_best_peaks():
     rays = VIEW.mesh.rays[cells_ahead(1.2, 2.5, 5.0)]
     seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score) for ray, score in zip(rays, (1.0, 3.0, 2.0), strict=True)])
-    found, _ = locate(seen, {"ball": Sure(max_proposals=2)}, SETTINGS, Stopwatch())
+    found, _ = objects(seen, {"ball": Sure(max_proposals=2)})
     assert len(found) == 2
     assert min(each.distance for each in found) > 2.0  # not the nearest, whose score is the lowest
 
@@ -406,7 +419,7 @@ def test_without_a_look_the_peaks_are_the_objects():
     for larger in (1.0, 1.5):
         balls = replace(BALLS, object_radius=larger * BALLS.radius)
         seen = observed(VIEW._replace(shape=balls.object_shape), balls, rows)
-        found, rejected = locate(seen, {}, SETTINGS, Stopwatch(), explain=True)
+        found, rejected = objects(seen, {}, explain=True)
         assert [each.confidence for each in found] == pytest.approx([0.9526, 0.7311], abs=1e-3)
         for each, ray, size in zip(found, rays[[1, 0]], (0.1, 0.0), strict=True):
             assert offset(VIEW, VIEW.heading.T @ each.bearing, ray) < 0.01
@@ -419,10 +432,10 @@ def test_a_look_at_uprights_judges_their_peaks():
     (cell,) = cells_ahead(2.0)
     seen = observed(VIEW, BALLS, [("goal", VIEW.mesh.rays[cell], 0.0, 3.0)])
     look = Sure(object_class="goal", upright_radius=0.3)
-    (base,) = find_uprights(seen, "goal", look, SETTINGS)
+    (base,) = uprights(seen, "goal", {"goal": look})
     np.testing.assert_allclose(base.position, place_of(VIEW, VIEW.mesh.rays[cell]), atol=1e-3)
     assert base.width == pytest.approx(0.6)
-    (post,) = locate_features(seen, {"goal": look}, SETTINGS).posts
+    (post,) = locate_features(seen, judge_classes(seen, {"goal": look}, SETTINGS, Stopwatch())).posts
     assert post.confidence == pytest.approx(0.9)
 
 
@@ -432,7 +445,7 @@ def test_a_base_moves_as_its_look_says_and_a_doubtful_look_reports_nothing():
 
     def found(**answers):
         look = Sure(object_class="goal", upright_radius=0.3, **answers)
-        return [VIEW.heading.T[:2, :2] @ each.position for each in find_uprights(seen, "goal", look, SETTINGS)]
+        return [VIEW.heading.T[:2, :2] @ each.position for each in uprights(seen, "goal", {"goal": look})]
 
     (still,), (right,), (down,) = found(), found(right=0.5), found(down=0.2)
     assert (right - still)[1] == pytest.approx(-0.15, abs=0.03)  # y is to the left

@@ -31,7 +31,7 @@ GRAYS = {"ball": 200, "goal": 240, "line": 250, "field": 90, "robot": 30, "envir
 def view():
     """The view of the drawn field, with circles around bases."""
     subject = load_subject(model_path("soccer"), Settings())
-    return around_bases(subject.observe(picture()), RADIUS).view
+    return around_bases(subject.observe(picture()), RADIUS)
 
 
 @pytest.fixture(scope="module")
