@@ -197,7 +197,7 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
     free = np.empty((4, count))  # weights, twice, and precisions; 0 where not free
     free[:2] = points.weights
     np.divide(points.weights, reach * reach, out=free[2:])
-    weights, all_bins = free[:2].reshape(-1), bins.reshape(-1)
+    weights, all_bins, expected = free[:2].reshape(-1), bins.reshape(-1), normals.tolist()
     lines: list[_Line] = []
     for _ in range(_MOST_LINES):
         votes = np.bincount(all_bins, weights, 2 * _COUNT)
@@ -207,7 +207,7 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
             break
         axis = peak // _COUNT
         near = (bins[axis] - peak).view(np.uintp) < 2
-        direction, distance, on = _fit(moments, free[2 + axis], reach[axis], near, normals[axis].tolist())
+        direction, distance, on = _fit(moments, free[2 + axis], reach[axis], near, expected[axis])
         members = (on & (weights[:count] > 0.0)).nonzero()[0]
         if len(members) >= _FEWEST:
             lines.append(_Line(axis, direction, distance, members))
