@@ -54,8 +54,8 @@ def accuracy(found: dict[str, Any]) -> str:
     tests = [each["field"] for each in found["networks"].values()]
     ((pictures, width, height),) = {(each["pictures"], *each["size"]) for each in tests}
     about = (
-        f"The networks of the package were tested on {pictures} rendered pictures of soccer fields, "
-        f"{width} x {height} px, lit by panoramas that they have not seen:"
+        f"The test is {pictures} rendered pictures of soccer fields, {width} x {height} px, lit by panoramas that no "
+        "training has seen:"
     )
     rows = []
     for name, sets in found["networks"].items():
