@@ -28,7 +28,7 @@ from .rings import inclinations
 BLOCK, GAP = 8, 2
 """On a canvas, a strip begins at a multiple of BLOCK cells, and has GAP empty cells at its end."""
 
-_ABOVE, _BELOW, _BESIDE = 8, 4, 8
+_ABOVE, _BELOW, _BESIDE = 3, 2, 8
 """Rows of context above and below the rings of an octave, at least, and columns of context where a strip ends behind
 the camera."""
 
