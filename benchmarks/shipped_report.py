@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import textwrap
 import tomllib
 from typing import Any
 
 import numpy as np
 
+from benchmarks import measured_frames
 from benchmarks.field import RESULTS as FIELD_RESULTS
 from benchmarks.field import figures
 from benchmarks.report import DOCS, EXPERIMENTS, README, fill, number, table
@@ -20,10 +22,6 @@ from vm_workstation.plots import new_figure, save_figure
 PAGE = DOCS / "results.md"
 MORE = EXPERIMENTS / "networks.md"
 COLORS = {"ball": "#d95f02", "soccer": "#1b9e77"}
-
-
-WEAK = """ A quarter of the robots is missed, and line points beyond 6 m are rare: docs/results.md has
-the figures of all features of the field."""
 
 
 def networks(found: dict[str, Any], each_set: str) -> str:
@@ -52,7 +50,13 @@ def networks(found: dict[str, Any], each_set: str) -> str:
 
 
 def accuracy(found: dict[str, Any]) -> str:
-    """The README's table: all networks on fields."""
+    """The README's part: all networks on fields."""
+    tests = [each["field"] for each in found["networks"].values()]
+    ((pictures, width, height),) = {(each["pictures"], *each["size"]) for each in tests}
+    about = (
+        f"The test is {pictures} rendered pictures of soccer fields, {width} x {height} px, lit by panoramas that no "
+        "training has seen:"
+    )
     rows = []
     for name, sets in found["networks"].items():
         scores = sets["field"]
@@ -67,7 +71,14 @@ def accuracy(found: dict[str, Any]) -> str:
             ]
         )
     heads = ["network", "AP50, 0.5 to 6 m", "AP50, 6 to 10 m", "found, 0.5 to 6 m", "found, 6 to 10 m"]
-    return table([*heads, "false per picture", "median distance error"], rows)
+    made = table([*heads, "false per picture", "median distance error"], rows)
+    return f"{textwrap.fill(about, 120)}\n\n{made}"
+
+
+def readme() -> dict[str, str]:
+    """The README's parts about accuracy, by the names of their marks."""
+    found, real = (json.loads(each.read_text()) for each in (RESULTS, measured_frames.RESULTS))
+    return {"accuracy": accuracy(found), "real frames": measured_frames.sentence(real)}
 
 
 def proposals(found: dict[str, Any]) -> str:
@@ -185,8 +196,13 @@ def _look_data(look: LookContract, recipe: str) -> str:
     )
 
 
-def card(found: dict[str, Any], name: str) -> str:
+def card(found: dict[str, Any], field: dict[str, Any], name: str) -> str:
     """A network's model card: contents, training data, accuracy and limits."""
+    robots = field["sets"]["field"]["features"]["robots"]["near"]["recall"]
+    weak = (
+        f" Up to 6 m, {number(1.0 - robots, 0, 100.0)} % of the robots are missed, and line points beyond are rare:\n"
+        "docs/results.md has the figures of all features of the field."
+    )
     model = read_model(model_path(name))
     manifest = model.manifest
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
@@ -240,7 +256,7 @@ docs/results.md has more figures.
 
 **Limits.** It was trained on rendered pictures only. The balls were mostly white, orange, yellow or of other bright
 colors, and lay on the plane. Balls darker than the field, balls in the air, and cameras below 0.35 m or above 1.3 m
-were rare or absent.{WEAK if name == "soccer" else ""}
+were rare or absent.{weak if name == "soccer" else ""}
 """
 
 
@@ -265,9 +281,9 @@ def main() -> None:
         ],
     )
     fill(MORE, more)
-    fill(README, {"accuracy": accuracy(found)})
+    fill(README, readme())
     for name in found["networks"]:
-        model_path(name).with_suffix(".md").write_text(card(found, name))
+        model_path(name).with_suffix(".md").write_text(card(found, field, name))
     plot(found)
 
 

@@ -29,7 +29,7 @@ _AGREES = 0.03
 """A place agrees with a border if they differ by less than this share of the distance, or by less than the mesh can
 resolve."""
 
-_ENOUGH = 0.95
+_ENOUGH = 0.9
 """A hull that this share of the places agrees with is good enough."""
 
 _MOST_HULLS = 8
@@ -46,7 +46,8 @@ def find_border(points: GroundPoints) -> Floats:
     if sum(ended) < 3:
         return np.empty((0, 2))
     limit = max(_AGREES, points.across / points.height)
-    best, most = ([], []), -2
+    best: Hull = [], []
+    most = -2
     for hull in islice(_hulls(places), _MOST_HULLS):
         agreeing = sum([-limit < each < limit for each in hull[1]])
         if agreeing > most + 1:  # one place more may agree by chance; then the hull with more corners stays
@@ -141,7 +142,7 @@ def _beyond(
 ) -> list[float]:
     """How far places are beyond the polyline through at least two of them, as a share of their distance there.
 
-    known: the result for another polyline that differs from this one only in the pieces number `first` up to `end`.
+    known: the result for a polyline that differs from this one only in the pieces from number `first` up to `end`.
     """
     beyond = list(known) or [0.0] * len(places)
     edges = [0, *corners[1:-1], len(places)]  # the first and the last piece go on

@@ -51,18 +51,18 @@ def find_features(
     ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
     places = np.concatenate([ends, border, behind.view(np.float64).reshape(-1, 2)])
     pixels = to_pixels(places)  # faster at once
-    shown = np.isfinite(pixels[len(ends) + len(border) :, 0]).reshape(-1, 2)
+    shown = np.isfinite(pixels[len(ends) + len(border) :, 0]).reshape(-1, 2).tolist()
     lines = tuple(map(Segment, ends.reshape(-1, 2, 2), pixels[: len(ends)].reshape(-1, 2, 2), confidences))
-    thinned, confidences = _thinned(likely)
+    thinned, likelihoods = _thinned(likely)
     return FieldFeatures(
         posts=posts,
         goals=pair_posts(posts),
         robots=robots,
         lines=lines,
         circle=None if circle is None else _circle(circle, likely),
-        crossings=certain_crossings([each for each, *_ in crossings], shown.all(axis=1).tolist()),
+        crossings=certain_crossings([each for each, *_ in crossings], [one and other for one, other in shown]),
         line_points=thinned,
-        line_confidences=confidences,
+        line_confidences=likelihoods,
         border=Border(border, pixels[len(ends) : len(ends) + len(border)]) if len(border) else None,
     )
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Chosen, Floats, Mask, Singles
+from ..arrays import Chosen, Floats, Indices, Mask, Singles
 
 ROLES = ("goal", "robot", "line", "field")
 """Names of the classes that field features are made of."""
@@ -44,23 +44,23 @@ class GroundMap:
     directions: npt.NDArray[np.complex128]
 
 
-def ground_map(rays: Floats, numbers: npt.NDArray[np.integer]) -> GroundMap:
+def ground_map(rays: Floats, numbers: Chosen | Indices) -> GroundMap:
     """The map of rays (m, 3) that point downward, of those with these numbers."""
     upward = rays[numbers, 2]
     order = np.argsort(upward, kind="stable")
-    numbers = numbers[order[: np.searchsorted(upward[order], -_LOWEST)]].astype(np.intp)
-    x, y, z = rays[numbers].T
+    sorted_numbers = numbers[order[: np.searchsorted(upward[order], -_LOWEST)]].astype(np.intp)
+    x, y, z = rays[sorted_numbers].T
     places = np.array([x, y]) / -z
     ranges = np.hypot(*places)
     column = np.floor((np.arctan2(places[1], places[0]) + np.pi) / COLUMN).astype(np.intp)
     order = np.argsort(column, kind="stable")
     count = int(2.0 * np.pi / COLUMN) + 1
     return GroundMap(
-        numbers,
+        sorted_numbers,
         places,
         ranges,
         leaning(ranges).astype(np.float32),
-        numbers[order],
+        sorted_numbers[order],
         ranges[order],
         np.searchsorted(column[order], np.arange(count + 1)),
         np.exp(1j * ((np.arange(count) + 0.5) * COLUMN - np.pi)),

@@ -9,14 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Chosen, Floats, Mask, Singles
+from ..arrays import Chosen, Floats, Mask, Number, Singles
 from .ground_points import GroundPoints, starts_of_runs
-
-AnyFloats = TypeVar("AnyFloats", Floats, Singles)
 
 LEAST = 0.1
 """Points with a smaller probability of the class line suggest no line."""
@@ -27,7 +25,7 @@ _FARTHEST = 10.0
 _ANGLES = 45
 """Directions that the Hough transform tries, from 0 to a right angle."""
 
-_MOST_VOTERS = 200
+_MOST_VOTERS = 100
 """Largest number of points that choose the direction."""
 
 _BIN = 0.06
@@ -91,7 +89,7 @@ class LinePoints:
         )
 
 
-def tolerance(offsets: AnyFloats, leaning: AnyFloats, ground: GroundPoints) -> AnyFloats:
+def tolerance(offsets: Number, leaning: Number, ground: GroundPoints) -> Number:
     """How far (...) [m] a point may be from a line's middle: by more than half the way to the next point.
 
     offsets (...) [m]: how far the points are from the camera along the line's normal. leaning (...): see GroundMap.
@@ -152,7 +150,7 @@ _TRIED = np.arange(_ANGLES, dtype=np.float64) * (0.5 * math.pi / _ANGLES)
 _NORMALS = _normals(_TRIED).reshape(-1, 2).astype(np.float32)
 
 
-def _bins(normals: AnyFloats, places: AnyFloats) -> Chosen:
+def _bins(normals: Number, places: Number) -> Chosen:
     """Bins (r, n) of lines with normals (r, 2) through places (2, n) [m]: by their distances from the camera, finer for
     near lines. Each row has its own bins."""
     steps = (normals * (1.0 / _STEP)) @ places
@@ -199,7 +197,7 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
     free = np.empty((4, count))  # weights, twice, and precisions; 0 where not free
     free[:2] = points.weights
     np.divide(points.weights, reach * reach, out=free[2:])
-    weights, all_bins = free[:2].reshape(-1), bins.reshape(-1)
+    weights, all_bins, expected = free[:2].reshape(-1), bins.reshape(-1), normals.tolist()
     lines: list[_Line] = []
     for _ in range(_MOST_LINES):
         votes = np.bincount(all_bins, weights, 2 * _COUNT)
@@ -209,7 +207,7 @@ def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
             break
         axis = peak // _COUNT
         near = (bins[axis] - peak).view(np.uintp) < 2
-        direction, distance, on = _fit(moments, free[2 + axis], reach[axis], near, normals[axis].tolist())
+        direction, distance, on = _fit(moments, free[2 + axis], reach[axis], near, expected[axis])
         members = (on & (weights[:count] > 0.0)).nonzero()[0]
         if len(members) >= _FEWEST:
             lines.append(_Line(axis, direction, distance, members))

@@ -106,7 +106,7 @@ def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Pr
 def _free_reach(ends: Floats, normals: Floats, points: GroundPoints) -> Floats:
     """How far (p, 2) [m] the ridge may be from both ends (p, 2, 2) of pieces: as far as points may be."""
     ranges = np.hypot(ends[:, :, 0], ends[:, :, 1]) / points.height
-    return tolerance((ends * normals[:, None]).sum(axis=2), leaning(ranges), points)
+    return np.asarray(tolerance((ends * normals[:, None]).sum(axis=2), leaning(ranges), points))
 
 
 def _windows(width: int) -> Singles:
