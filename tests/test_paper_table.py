@@ -19,6 +19,28 @@ FIGURES = {
     *(f"fig:ball_detection_images{number}" for number in ("", "_1", "_2", "_3")),
 }
 LABELS = EQUATIONS | FIGURES | {"tab:visualmesh_performance"}
+CLAIMS = {
+    "Visual Mesh Geometry": "plane, height, orientation, radius, recursi, cones, segment, cylinders",
+    "Circle": "adds its diameter/adding the diameter, singularity",
+    "Sphere": "shadow, circle",
+    "Object Dependent Sample Density": "rings, fraction, r1/r_1",
+    "Graph Structure of the Mesh": "project, four, number of points, 1 in, two, six, below the camera, ball",
+    "Network": "3 x 3, six neighbors, two fewer values, 5 x 5",
+    "Dataset": "160,000, mask, orientation, panorama/360 degree, over a hundred, equisolid, rectilinear, ten meters, "
+    "size, uniform, intensity of the light",
+    "Network Architecture": "two to nine, two to eight, width four, significantly better, SELU, ELU, ReLU, three, "
+    "half, one and two ball radii, hexagonal grid, pixels",
+    "Training": "gather, equal, weighting, overfitting/over-fitting, 5 %, error, greatly improve, TensorFlow, "
+    "fine-tuned, five",
+    "Precision": "75 %, hexagonal, deep/depth, 2.5 m, constant, nois, peak, 0 m, distance, five",
+    "Detections": "false positives, distan, size",
+    "Execution performance": "1280 x 1024, project, GPU",
+    "Discussion and Conclusion": "nine, five, SSD MobileNet, RCNN, YOLOv3, 4 m, graph diameter, "
+    "best fitting subgraph, resolution, declin, scale/scaling, rotations, orientation, goal posts, lens, height, "
+    "below the camera, twice as many points",
+    "Abstract": "sixteen times, fastest competitor",
+}
+"""What the paper claims in each section: words, some in the form of this page and in that of the paper."""
 
 CODE = re.compile(r"\[`([\w./]+)`\]\(\.\./([\w./]+)\): ((?:`[\w.]+`(?:, )?)+)")
 LINK = r"\[[^\]]+\]\([\w./]+(?:#[\w-]+)?\)"
@@ -40,6 +62,21 @@ def lines():
 
 
 LINES = lines()
+
+
+def terms():
+    """(section, words of a claim in the page's and in the paper's form) of all claims."""
+    return [(section, each.split("/")) for section, text in CLAIMS.items() for each in text.split(", ")]
+
+
+def sections(text):
+    """The text of each section, by its title, of a page or of the paper; without the TeX of units and formulas."""
+    text = re.sub(r"\\SI\{([^}]*)\}\{(.*?)\}(?!\})", r"\1 \2", text)
+    for tex, plain in (("\\percent", "%"), ("\\meter", "m"), ("\\degree", "degree"), ("\\times", " x "), ("$", "")):
+        text = text.replace(tex, plain)
+    _, *parts = re.split(r"^## (.*)\n|\\(?:sub)*section\{([^}]*)\}|\\begin\{(abstract)\}", text, flags=re.MULTILINE)
+    titles = [page or paper or tex.title() for page, paper, tex in zip(*(parts[i::4] for i in range(3)), strict=True)]
+    return {title: " ".join(part.split()).casefold() for title, part in zip(titles, parts[3::4], strict=True)}
 
 
 def code_of(text):
@@ -117,7 +154,11 @@ def test_the_text_of_a_definition_ends_with_it():
 def test_every_label_of_the_paper_has_a_line():
     named = {label.strip("`") for label, _, _ in LINES if label.startswith("`")}
     assert named == LABELS
-    assert len(LINES) > 60
+
+
+@pytest.mark.parametrize(("section", "words"), terms())
+def test_every_claim_of_the_paper_is_in_its_section(section, words):
+    assert words[0].casefold() in sections(PAGE.read_text())[section]
 
 
 def test_labels_and_sections_are_the_papers():
@@ -125,9 +166,13 @@ def test_labels_and_sections_are_the_papers():
         pytest.skip(f"needs the paper, which is not at {PAPER}; set VM_SHARED to the folder above it")
     text = PAPER.read_text()
     assert {label for label in re.findall(r"\\label\{([^}]*)\}", text) if not label.startswith("sec:")} == LABELS
-    sections = {*re.findall(r"section\{([^}]*)\}", text), "Abstract"}
+    found = sections(text)
     named = {label for label, _, _ in LINES if not label.startswith("`")}
-    assert named <= sections, f"no sections of the paper: {sorted(named - sections)}"
+    assert named <= {*found}, f"no sections of the paper: {sorted(named - {*found})}"
+    with_claims = {*found} - {"Introduction", "Evaluation of the Visual Mesh", "Results"}
+    assert {*CLAIMS} == with_claims == {*sections(PAGE.read_text())}
+    missing = [(section, words) for section, words in terms() if words[-1].casefold() not in found[section]]
+    assert not missing, f"not in the paper: {missing}"
 
 
 def test_equations_stand_in_the_code_that_builds_meshes():

@@ -35,7 +35,7 @@ OTHERS = (
 CALLS = [
     ("vm_train.cli.train", "torch", ["data", "-o", "run"]),
     ("vm_train.cli.train", "google", ["import", "a.tfrecord", "out"]),
-    ("vm_train.cli.evaluate", "matplotlib", ["points", "-o", "points.svg"]),
+    ("vm_train.cli.evaluate", "matplotlib", ["ball", str(TOP / "tests" / "fixtures" / "demo"), "-o", "report"]),
     ("vm_export.cli", "torch", ["model.pt"]),
     ("vm_synth.cli", "mitsuba", ["out", "--count", "1", "--hdri", "."]),
     ("vm_mesh.cli", "matplotlib", ["quality", "-o", "quality.svg"]),

@@ -105,7 +105,7 @@ def _sharp_frames(source: str, left_out: Counter[str]) -> Iterator[tuple[str, Im
     if count is None:  # some videos do not tell their length
         count = sum(1 for _ in open_source(source).frames)
     length = -(-count // SEARCHED)
-    progress = ProgressBar(count, "vm-calibrate")
+    progress = ProgressBar(count, "vm-calibrate", unit="frames")
     best: tuple[float, str, Image] | None = None
     try:
         for frame in opened.frames:

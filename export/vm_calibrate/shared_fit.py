@@ -69,7 +69,7 @@ def fit_shared(
         found = residuals(*split(numbers))
         return np.asarray(np.where(np.isfinite(found), np.clip(found, -_WORST, _WORST), _WORST))
 
-    bar = ProgressBar(_MOST_STEPS, "vm-calibrate")
+    bar = ProgressBar(_MOST_STEPS, "vm-calibrate", unit="steps")
     bar.note = "most fits need far fewer steps"
 
     def jacobian(numbers: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -66,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.check_config:
         return _check(options)
     log = EventLog()
-    return run_daemon(log, lambda: _prepare(options, given[cut + 1 :], log))
+    return run_daemon(log, lambda: _prepare(given[:cut], given[cut + 1 :], options, log))
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -79,10 +79,27 @@ def _check(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-async def _prepare(options: argparse.Namespace, ros_arguments: Sequence[str], log: EventLog) -> Daemon:
-    """Connect to ROS, and prepare a daemon that publishes there. Raises VisualMeshError."""
-    node = Node(configuration(options), connect(NODE, ros_arguments))
+async def _prepare(
+    words: Sequence[str], ros_arguments: Sequence[str], options: argparse.Namespace, log: EventLog
+) -> Daemon:
+    """Connect to ROS, and prepare a daemon that publishes there. options: of `words`. Raises VisualMeshError."""
+    middleware = connect(NODE, ros_arguments, configuration(options).ros.middleware)
+    if middleware.remark:
+        log("ros", "warning", remark=middleware.remark)
+    options = parser().parse_args([*parameter_options(middleware.parameters), *words])
+    node = Node(configuration(options), middleware)
     return await Daemon.prepare(lambda: configuration(options), log, node)
+
+
+def parameter_options(parameters: Mapping[str, Any]) -> list[str]:
+    """The options that parameters of the node stand for: height for --height, ros_image for --ros-image."""
+    words = []
+    for name, value in parameters.items():
+        option = name.replace("_", "-")
+        words.append(
+            f"--{option}={value}" if not isinstance(value, bool) else f"--{option if value else f'no-{option}'}"
+        )
+    return words
 
 
 def configuration(options: argparse.Namespace) -> Configuration:

@@ -10,7 +10,7 @@ from typing import Any
 from cyclonedds.idl import make_idl_struct
 from cyclonedds.idl import types as idl
 
-from vm_embedded.cameras.ros.message_fields import FIELDS, fields_of
+from vm_embedded.cameras.ros.message_fields import FIELDS, fields_of, short_name
 
 _PRIMITIVES: dict[str, Any] = {
     "bool": bool,
@@ -18,6 +18,7 @@ _PRIMITIVES: dict[str, Any] = {
     "uint8": idl.uint8,
     "int32": idl.int32,
     "uint32": idl.uint32,
+    "float32": idl.float32,
     "float64": idl.float64,
     "string": str,
 }
@@ -31,7 +32,7 @@ def message_classes() -> SimpleNamespace:
     classes: dict[str, Any] = {}
     for full in FIELDS:
         package, _, name = full.split("/")
-        classes[name] = _message_class(full, f"{package}::msg::dds_::{name}_", classes)
+        classes[short_name(full)] = _message_class(full, f"{package}::msg::dds_::{name}_", classes)
     for name, level in _LEVELS.items():
         setattr(classes["DiagnosticStatus"], name, level)
     return SimpleNamespace(**classes, octets=bytes, doubles=_doubles)

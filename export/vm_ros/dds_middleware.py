@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from cyclonedds.core import DDSException, InstanceState, ReadCondition, SampleState, ViewState, WaitSet
@@ -59,6 +59,9 @@ class DdsPublisher:
 
 class DdsMiddleware:
     """A participant of DDS, whose readers a thread waits for. Raises InputError if DDS can't start."""
+
+    parameters: Mapping[str, Any] = {}
+    remark = ""
 
     def __init__(self) -> None:
         self.types: Any = message_classes()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 SENSOR, POSES, TRANSFORMS, FIXED_TRANSFORMS, DETECTIONS = "sensor", "poses", "tf", "tf_static", "detections"
@@ -24,11 +24,14 @@ class Publisher(Protocol):
 class Middleware(Protocol):
     """A connection to ROS 2.
 
-    types: its message classes by their short names, and the functions octets(bytes) and doubles(numbers), which make
-    the arrays of messages.
+    types: its message classes by their short names, as far as their packages are installed, and the functions
+    octets(bytes) and doubles(numbers), which make the arrays of messages. parameters: those of the node, by their
+    names. remark: what is left out, and what helps; empty if nothing is.
     """
 
     types: Any
+    parameters: Mapping[str, Any]
+    remark: str
 
     def subscribe(self, topic: str, message: str, take: Callable[[Any], None], kind: str = SENSOR) -> None:
         """Have `take` called, in another thread, with each message of a topic. message: its short name."""

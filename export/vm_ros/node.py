@@ -21,21 +21,16 @@ from vm_embedded.cameras.open_camera import ROS, Opener, camera_opener
 from vm_embedded.cameras.ros.camera_poses import newest_pose, orientation_of
 from vm_embedded.cameras.ros.images import jpeg_message
 from vm_embedded.cameras.ros.lens import lens_of
-from vm_embedded.cameras.ros.settings import NODE, camera_info_beside
+from vm_embedded.cameras.ros.settings import DEBUG_IMAGE, MAP, NODE, camera_info_beside
 from vm_embedded.cameras.ros.stamps import StampClock, seconds_of, stamp_of
 from vm_embedded.cameras.ros.transforms import Transform, TransformTree
-from vm_embedded.detection.detections import Detections
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.geometry.lens import Lens
 from vm_embedded.live.answering import Answer
 from vm_embedded.live.configuration import Configuration
 from vm_embedded.output.messages import Message
-from vm_embedded.output.ros.detection_messages import (
-    detection_2d_array,
-    detection_3d_array,
-    diagnostic_array,
-    header_of,
-)
+from vm_embedded.output.ros.detection_messages import FrameResults, diagnostic_array, header_of
+from vm_embedded.output.ros.topics import TOPICS
 from vm_embedded.poses.stream import PoseStream
 
 from .middleware import FIXED_TRANSFORMS, POSES, SENSOR, TRANSFORMS, Middleware
@@ -75,9 +70,13 @@ class Node:
         self._reported = ("", -np.inf)  # state, and when it was published
         self._drawing: asyncio.Task[None] | None = None
         prefix = self._ros.namespace.rstrip("/")
-        self._detections_2d = middleware.publisher(f"{prefix}/detections_2d", "Detection2DArray")
-        self._detections_3d = middleware.publisher(f"{prefix}/detections_3d", "Detection3DArray")
-        self._debug_image = middleware.publisher(f"{prefix}/debug_image/compressed", "CompressedImage")
+        self._publishers = [
+            (middleware.publisher(f"{prefix}/{name}", message), make)
+            for name, (message, make) in TOPICS.items()
+            if hasattr(types, message)
+        ]
+        self._debug_image = middleware.publisher(f"{prefix}/{DEBUG_IMAGE}", "CompressedImage")
+        self._map = middleware.publisher(f"{prefix}/{MAP}", "CompressedImage")
         self._diagnostics = middleware.publisher("/diagnostics", "DiagnosticArray")
 
     def opener(self, settings: CameraSettings, raw: bool) -> Opener:
@@ -116,7 +115,7 @@ class Node:
         await asyncio.to_thread(self._middleware.close)
 
     def publish(self, message: Message, answer: Answer | None) -> None:
-        """Publish the detections of a frame, and at each change and once per second the state. No frame, no arrays."""
+        """Publish what a frame shows, and at each change and once per second the state. No frame, no arrays."""
         if answer is not None:
             self._publish_detections(answer)
         now = time.monotonic()
@@ -131,21 +130,26 @@ class Node:
         else:
             stamp = stamp_of(types, shot.captured + time.time() - time.monotonic())
             frame_id = self._camera_frame
-        in_image, on_plane = (header_of(types, stamp, each) for each in (frame_id, self._ros.plane_frame))
         detections = answer.detections
-        self._detections_2d.publish(detection_2d_array(types, in_image, detections, answer.orientation))
         try:
             offset = self._camera_offset(shot.captured)
         except InputError as error:  # tf has changed since the pose of this frame
             self._poses.reject(str(error))
-        else:
-            self._detections_3d.publish(detection_3d_array(types, on_plane, detections, offset))
-        if self._debug_image.readers and (self._drawing is None or self._drawing.done()):
-            drawing = asyncio.to_thread(self._publish_debug_image, in_image, shot.image, detections)
-            self._drawing = asyncio.ensure_future(drawing)
+            return
+        in_image, on_plane = (header_of(types, stamp, each) for each in (frame_id, self._ros.plane_frame))
+        frame = FrameResults(types, in_image, on_plane, detections, answer.orientation, offset)
+        for publisher, make in self._publishers:
+            message = make(frame) if publisher.readers else None
+            if message is not None:
+                publisher.publish(message)
+        if (self._debug_image.readers or self._map.readers) and (self._drawing is None or self._drawing.done()):
+            self._drawing = asyncio.ensure_future(asyncio.to_thread(self._publish_drawings, frame, shot.image))
 
-    def _publish_debug_image(self, header: Any, image: Image, detections: Detections) -> None:
-        self._debug_image.publish(jpeg_message(self._types, header, detections.draw(image)))
+    def _publish_drawings(self, frame: FrameResults, image: Image) -> None:
+        if self._debug_image.readers:
+            self._debug_image.publish(jpeg_message(frame.types, frame.in_image, frame.detections.draw(image)))
+        if self._map.readers:
+            self._map.publish(jpeg_message(frame.types, frame.on_plane, frame.detections.draw_map()))
 
     def _camera_offset(self, captured: float) -> Floats:
         """Where the camera is in the plane's frame (2,) [m]; zeros if its origin is below the camera.

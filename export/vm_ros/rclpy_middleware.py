@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from types import SimpleNamespace
@@ -16,8 +16,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
-from vm_embedded.cameras.ros.message_fields import FIELDS
-from vm_embedded.errors import InputError
+from vm_embedded.cameras.ros.message_fields import FIELDS, MESSAGES, short_name
+from vm_embedded.errors import InputError, one_line
 
 from .middleware import DETECTIONS, FIXED_TRANSFORMS, POSES, SENSOR, TRANSFORMS
 
@@ -30,6 +30,9 @@ _PROFILES = {
     ),
     DETECTIONS: QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE),
 }
+
+_OWN_PARAMETERS = ("use_sim_time", "start_type_description_service")
+"""Parameters that rclpy declares."""
 
 
 class RclpyPublisher:
@@ -46,24 +49,45 @@ class RclpyPublisher:
 
 
 class RclpyMiddleware:
-    """A node of rclpy, which a thread spins. Raises InputError if ROS lacks a package of messages."""
+    """A node of rclpy, which a thread spins. Raises InputError for wrong arguments."""
 
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
-        self.types: Any = _message_classes()
+        self.types, self._missing = message_classes()
         # The daemon handles signals.
-        rclpy.init(args=["--ros-args", *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node(name)
+        try:
+            rclpy.init(args=["--ros-args", *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        except RuntimeError as error:  # also those of the bindings
+            raise InputError(f"ROS rejects what stands behind --ros-args: {one_line(error)}") from error
+        self._node = rclpy.create_node(name, automatically_declare_parameters_from_overrides=True)
+        self.parameters: Mapping[str, Any] = {
+            each: parameter.value
+            for each, parameter in self._node.get_parameters_by_prefix("").items()
+            if each not in _OWN_PARAMETERS and not each.startswith("qos_overrides.")
+        }
+        if self._node.get_parameter("use_sim_time").value:
+            self.parameters = {"ros_clock": "arrival", **self.parameters}
+        self.remark = (
+            f"topics with messages of these packages are left out; to have them, {_install(self._missing)}"
+            if self._missing
+            else ""
+        )
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="ros", daemon=True)
 
     def subscribe(self, topic: str, message: str, take: Callable[[Any], None], kind: str = SENSOR) -> None:
-        """Have `take` called with each message of a topic."""
-        self._node.create_subscription(getattr(self.types, message), topic, take, _PROFILES[kind])
+        """Have `take` called with each message of a topic. Raises InputError without its package."""
+        self._node.create_subscription(self._class(message), topic, take, _PROFILES[kind])
 
     def publisher(self, topic: str, message: str, kind: str = DETECTIONS) -> RclpyPublisher:
-        """A publisher of messages with a short name."""
-        return RclpyPublisher(self._node.create_publisher(getattr(self.types, message), topic, _PROFILES[kind]))
+        """A publisher of messages with a short name. Raises InputError without its package."""
+        return RclpyPublisher(self._node.create_publisher(self._class(message), topic, _PROFILES[kind]))
+
+    def _class(self, message: str) -> Any:
+        if not hasattr(self.types, message):
+            package = MESSAGES[message].split("/")[0]
+            raise InputError(f"ROS lacks the messages {message}: {_install([package])}")
+        return getattr(self.types, message)
 
     def start(self) -> None:
         """Begin to receive."""
@@ -82,15 +106,20 @@ class RclpyMiddleware:
         rclpy.try_shutdown()
 
 
-def _message_classes() -> SimpleNamespace:
-    """The classes of all messages. Raises InputError for a package that is not installed."""
-    classes = {}
-    for package, _, name in (full.split("/") for full in FIELDS):
+def message_classes() -> tuple[SimpleNamespace, list[str]]:
+    """The classes of all messages whose packages are installed, and the names of the other packages."""
+    classes, missing = {}, set[str]()
+    for full in FIELDS:
+        package, _, name = full.split("/")
         try:
-            module = import_module(f"{package}.msg")
-        except ImportError as error:
-            distribution = os.environ.get("ROS_DISTRO", "$ROS_DISTRO")
-            needed = f"ros-{distribution}-{package.replace('_', '-')}"
-            raise InputError(f"ROS lacks the package {package}; run: sudo apt install {needed}") from error
-        classes[name] = getattr(module, name)
-    return SimpleNamespace(**classes, octets=lambda content: array("B", content), doubles=list)
+            classes[short_name(full)] = getattr(import_module(f"{package}.msg"), name)
+        except ImportError:
+            missing.add(package)
+    return SimpleNamespace(**classes, octets=lambda content: array("B", content), doubles=list), sorted(missing)
+
+
+def _install(packages: Sequence[str]) -> str:
+    """How to install packages of messages."""
+    distribution = os.environ.get("ROS_DISTRO", "")
+    names = " ".join(f"ros-{distribution}-{each.replace('_', '-')}" for each in packages)
+    return f"run: sudo apt install {names}" if distribution else f"install {', '.join(packages)}"

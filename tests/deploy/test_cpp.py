@@ -24,7 +24,7 @@ from vm_embedded.borders.records import entries
 from vm_embedded.cameras.camera import Shot
 from vm_embedded.detection.detections import STAGES
 from vm_embedded.output.binary_form import HEADER as HEAD
-from vm_embedded.output.binary_form import LAYOUT, number_type, to_binary
+from vm_embedded.output.binary_form import LAYOUT, RECORDS, number_type, to_binary
 from vm_embedded.output.messages import LiveFrame, live_frame, state_message
 
 CHECKOUT = Path(__file__).parents[2]
@@ -142,6 +142,63 @@ def test_damaged_messages_are_errors_and_touch_no_foreign_memory(dump, messages,
         place = data.draw(st.integers(0, min(len(content), 200) - 1))
         content[place] = data.draw(st.integers(0, 255))
     dump(bytes(content[: data.draw(st.integers(1, len(content)))]))
+
+
+LARGEST = 2**32 - 1
+
+
+def hostile(message):
+    """(what is wrong, bytes) of copies of a message whose header, records and text do not fit together."""
+    content = to_binary(message)
+    head = np.frombuffer(content, HEAD, 1)[0]
+    body = content[HEAD.itemsize :]
+
+    def changed(body, **numbers):
+        new = head.copy()
+        for name, number in numbers.items():
+            new[name] = number
+        return new.tobytes() + body
+
+    text = int(head["text"])
+    for number in {text + 1, len(body) + 1, LARGEST, text - 1} - {-1}:
+        yield f"text of {number} bytes, not {text}", changed(body, text=number)
+    for name, kind in RECORDS.items():
+        count = int(head[name])
+        for number in {count + 1, count + len(body) // kind.itemsize + 1, LARGEST, count - 1} - {-1}:
+            yield f"{number} {name}, not {count}", changed(body, **{name: number})
+    for end in {0, 1, len(body) // 2, len(body) - 1} - {-1, len(body)}:
+        yield f"only {end} bytes behind the header, as announced", changed(body[:end], length=HEAD.itemsize - 4 + end)
+    for more in (1, max(kind.itemsize for kind in RECORDS.values())):
+        yield f"{more} more bytes, as announced", changed(body + bytes(more), length=len(content) - 4 + more)
+    if body:
+        yield "a header alone", content[: HEAD.itemsize]
+    yield "a header that ends early", content[: HEAD.itemsize - 1]
+    yield "a length within the header", changed(body, length=HEAD.itemsize - 5)
+    yield "the largest length", changed(body, length=LARGEST)
+    yield "neither a frame nor a state", changed(body, is_frame=2)
+    yield "an unknown state", changed(body, state=LARGEST)
+
+
+def test_a_message_that_does_not_fit_its_header_is_refused(dump, messages):
+    """Each is alone in memory of its size, so that the checks of the compiler find any read beyond its end."""
+    cases = [each for message in (messages[2], messages[-2], messages[-1]) for each in hostile(message)]
+    assert len(cases) > 100
+    accepted = {}
+    for wrong, content in cases:
+        *lines, last = dump(content)
+        if lines or not last.startswith("error "):
+            accepted[wrong] = last
+    assert not accepted
+
+
+def test_a_goal_whose_post_is_not_there_is_refused(dump, messages):
+    content, count = to_binary(messages[2]), len(messages[2]["field"]["goals"])
+    head = np.frombuffer(content, HEAD, 1)[0]
+    start = HEAD.itemsize + sum(int(head[name]) * RECORDS[name].itemsize for name in ("detections", "posts"))
+    assert np.frombuffer(content, RECORDS["goals"], count, start)["goals"].tolist() == messages[2]["field"]["goals"]
+    for post in (int(head["posts"]), LARGEST):
+        (line,) = dump(content[:start] + np.uint32(post).tobytes() + content[start + 4 :])
+        assert line == "error a goal has a post that is not there"
 
 
 @pytest.mark.parametrize(

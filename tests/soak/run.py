@@ -62,7 +62,7 @@ def main() -> int:
         folder = options.output / name
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        bar = ProgressBar(1000, name)
+        bar = ProgressBar(1000, name, unit="parts")
         report, passed = SOAKS[name](folder, lambda part, bar=bar: bar.show(int(1000 * part)))
         bar.clear()
         report += f"\n  {'as it must be' if passed else 'NOT as it must be'}"

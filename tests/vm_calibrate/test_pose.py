@@ -147,7 +147,7 @@ def test_a_fit_shows_its_progress(monkeypatch, capsys):
     balls = seen_balls(LENSES["equidistant"], CAMERA, np.random.default_rng(3), each=1)
     fit_balls(balls, LENSES["equidistant"], SIZE)
     assert re.search(
-        r"^vm-calibrate: \d+/200, .*, most fits need far fewer steps$", capsys.readouterr().err, re.MULTILINE
+        r"^vm-calibrate: \d+/200 steps, .*, most fits need far fewer steps$", capsys.readouterr().err, re.MULTILINE
     )
 
 

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from vm_embedded.cameras.ros.settings import DRAWN
+from vm_embedded.output.ros.topics import TOPICS
+
 from .loopback import running
 
 PAGE = (Path(__file__).parents[2] / "docs" / "ros.md").read_text()
@@ -36,8 +39,6 @@ def test_the_example_prints_where_the_ball_is_and_the_state(tmp_path, monkeypatc
 
 
 def test_the_page_names_all_topics_and_messages():
-    node = (Path(__file__).parents[2] / "export" / "vm_ros" / "node.py").read_text()
-    published = re.findall(r'middleware\.publisher\(f?"(?:\{prefix\})?(/[\w/]+)", "(\w+)"\)', node)
-    assert len(published) == 4
-    for topic, message in published:
-        assert re.search(rf"^\| `(/vm_ros)?{topic}` \| `\w+/{message}` \|", PAGE, re.MULTILINE), topic
+    named = {**{name: kind for name, (kind, _) in TOPICS.items()}, **dict.fromkeys(DRAWN, "CompressedImage")}
+    for topic, message in {**named, "/diagnostics": "DiagnosticArray"}.items():
+        assert re.search(rf"^\| .*`(/vm_ros/)?{topic}`.* \| `\w+/{message}` \|", PAGE, re.MULTILINE), topic

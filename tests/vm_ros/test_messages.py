@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.cameras.ros.bag_types import bag_types, typestore
-from vm_embedded.cameras.ros.message_fields import FIELDS, MESSAGES, fields_of
+from vm_embedded.cameras.ros.message_fields import FIELDS, MESSAGES, fields_of, short_name
 from vm_ros.dds_messages import message_classes
 
 DDS = message_classes()
@@ -21,6 +21,7 @@ NUMBERS = {
     "uint8": st.integers(0, 255),
     "int32": st.integers(-(2**31), 2**31 - 1),
     "uint32": st.integers(0, 2**32 - 1),
+    "float32": st.floats(allow_nan=False, width=32),
     "float64": st.floats(allow_nan=False),
     "string": st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=9),
 }
@@ -48,13 +49,15 @@ def made(types, full, values):
             filled[name] = types.octets(bytes(value))
         elif kind.startswith("float64["):
             filled[name] = types.doubles(value)
+        elif kind == "byte" and isinstance(types.DiagnosticStatus.OK, bytes):
+            filled[name] = bytes([value])  # in rclpy
         elif single in NUMBERS:
             filled[name] = value
         elif "[" in kind:
             filled[name] = [made(types, MESSAGES[single], each) for each in value]
         else:
             filled[name] = made(types, MESSAGES[single], value)
-    return getattr(types, full.rpartition("/")[2])(**filled)
+    return getattr(types, short_name(full))(**filled)
 
 
 def plain(message):
@@ -74,7 +77,7 @@ def test_each_message_has_the_bytes_of_ros(full):
         encoded = made(DDS, full, values).serialize()
         assert encoded == bytes(STORE.serialize_cdr(made(BAG, full, values), full))
         assert plain(STORE.deserialize_cdr(encoded, full)) == values
-        assert plain(getattr(DDS, full.rpartition("/")[2]).deserialize(encoded)) == values
+        assert plain(getattr(DDS, short_name(full)).deserialize(encoded)) == values
 
     check()
 

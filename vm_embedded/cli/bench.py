@@ -85,7 +85,7 @@ def _run(options: argparse.Namespace) -> int:
     model = read_model(network)
     settings = _settings_to_measure(options, given.detector)
     detectors = [Detector(model, each) for each in settings]
-    bar = ProgressBar(options.frames)
+    bar = ProgressBar(options.frames, unit="calls")
     runs = measure(detectors, work.image, work.lens, work.orientations, bar.show)
     bar.clear()
     _complain_about_defaults(given, work)
@@ -93,7 +93,7 @@ def _run(options: argparse.Namespace) -> int:
     if not _prints_json(options):
         print(bench_table(found), flush=True)
     if options.tune:
-        bar = ProgressBar(options.frames)
+        bar = ProgressBar(options.frames, unit="calls")
         threads = max(each.threads for each in settings)
         found["tuned"] = fastest_settings(model, given.detector, threads, work, bar.show)
         bar.clear()

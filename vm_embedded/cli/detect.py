@@ -34,6 +34,7 @@ _FILES_ONLY = (
     "save_mcap",
     "save_boxes",
     "save_overlay",
+    "save_map",
     "save_video",
     "save_points",
     "emit_points",
@@ -103,6 +104,9 @@ def parser() -> argparse.ArgumentParser:
     output = parser.add_argument_group("output, for files")
     output.add_argument(
         "--save-overlay", type=Path, metavar="DIR", help="write each image as NAME.jpg with its detections drawn in"
+    )
+    output.add_argument(
+        "--save-map", type=Path, metavar="DIR", help="write NAME-map.png: what each image shows, from above"
     )
     output.add_argument(
         "--save-video",

@@ -22,7 +22,7 @@ from ..live.configuration import Configuration
 from ..output.box_files import BoxWriter
 from ..output.messages import file_message
 from ..output.readable_line import to_readable_line
-from ..output.result_files import FrameNames, make_folder, save_overlay, save_points
+from ..output.result_files import FrameNames, make_folder, save_map, save_overlay, save_points
 from ..output.ros.mcap_file import McapFile
 from ..output.video_file import VideoFile
 from .closing_remarks import ClosingRemarks
@@ -51,7 +51,7 @@ def detect_in_files(options: argparse.Namespace, given: Configuration) -> int:
     check_read_format(format)
     source = open_frames(options.files or [given.camera.source], given)
     _check_overlays(options, source)
-    for folder in (options.save_overlay, options.save_points):
+    for folder in (options.save_overlay, options.save_map, options.save_points):
         if folder is not None:
             make_folder(folder)
     tracker = _TimedTracker(Tracker(given.track), given.camera.fps) if given.track.on else None
@@ -88,7 +88,7 @@ def _process_all(source: Source, work: _Pass) -> None:
 
     What is wrong with several frames is printed for the first one, and at the end with their number.
     """
-    bar, reasons = ProgressBar(source.count), Counter[str]()
+    bar, reasons = ProgressBar(source.count, unit="frames"), Counter[str]()
     for frame in source.frames:
         if work.tracker is not None and frame.index == 0:
             work.tracker.time(frame)  # without times, no frame can be processed
@@ -200,6 +200,8 @@ class _Pass:
             save_points(options.save_points / f"{name}.npz", detections)
         if options.save_overlay is not None:
             save_overlay(options.save_overlay / f"{name}.jpg", frame, detections)
+        if options.save_map is not None:
+            save_map(options.save_map / f"{name}-map.png", frame, detections)
         if self.mcap is not None:
             self.mcap.write(frame, lens, orientation, detections)
         if self.video is not None:

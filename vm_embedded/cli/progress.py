@@ -17,15 +17,16 @@ class ProgressBar:
     total: number of steps; None if unknown, and then nothing is shown.
     program: name at the start of each line; None writes no lines where there is no terminal.
     done: number of steps that an earlier run has completed; the time left does not count them.
+    unit: what a step is called, in the plural.
 
     Set `note` to what else to show, such as the loss of a training.
     """
 
-    def __init__(self, total: int | None, program: str | None = None, done: int = 0) -> None:
+    def __init__(self, total: int | None, program: str | None = None, done: int = 0, unit: str = "pictures") -> None:
         self.done = self._done_before = done
         self.note = ""
         self._total = total if total and total > 1 else None
-        self._program = program
+        self._program, self._unit = program, unit
         self._terminal = sys.stderr.isatty()
         self._visible = False
         self._start = self._updated = time.monotonic()
@@ -70,4 +71,4 @@ class ProgressBar:
         return f"{seconds // 3600}:{seconds // 60 % 60:02d}:{seconds % 60:02d} left"
 
     def _text(self, total: int) -> str:
-        return ", ".join(filter(None, [f"{self.done}/{total}", self.left, self.note]))
+        return ", ".join(filter(None, [f"{self.done}/{total} {self._unit}", self.left, self.note]))

@@ -21,6 +21,7 @@ from ..files import write_file
 from ..network.manifest import Manifest
 from .detection import Detection
 from .observation import Observation
+from .overhead import draw_overhead
 from .overlay import draw_overlay
 from .table import to_csv, to_row
 
@@ -194,6 +195,13 @@ class Detections:
         """
         canvas = self.observation.pyramid.bgr() if image is None else _checked_canvas(image, self.observation.view.size)
         return draw_overlay(canvas, self.observation, self.objects, self.rejected, self.threshold, self.field)
+
+    def draw_map(self) -> Image:
+        """A BGR image of the plane from above: 50 px per meter, the camera looks up, and rings are 2 m apart.
+
+        It shows what the frame shows of the plane, up to 12 m, with objects and features of the field.
+        """
+        return draw_overhead(self.observation.view, self.objects, self.field)
 
     def save(self, path: str | Path) -> None:
         """Write the frame with all that was found drawn in (.jpg, .png and others), the results as JSON (.json), or

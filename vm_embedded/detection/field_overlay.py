@@ -7,12 +7,12 @@ import numpy as np
 
 from ..arrays import Floats, Image
 from ..borders.opencv_text import draw_text, text_size
-from ..field.features import CenterCircle, FieldFeatures, Upright
+from ..field.features import FieldFeatures, Upright
 from .labels import INK, Color, Labels
 from .prepared_view import PreparedView
 
 # Colors are BGR. Magenta shows on white lines and on grass.
-_LINE, _BORDER, _POST, _ROBOT = (255, 0, 255), (255, 210, 0), (255, 190, 90), (60, 150, 255)
+_LINE, BORDER, POST, ROBOT = (255, 0, 255), (255, 210, 0), (255, 190, 90), (60, 150, 255)
 
 _PIECES = 16
 """Pieces of a straight line on the plane; most lenses bend it."""
@@ -25,15 +25,15 @@ def draw_field(canvas: Image, field: FieldFeatures, view: PreparedView, scale: f
     """Draw all features but their labels into a BGR image. scale: 1 for a picture of 1280 px."""
     thin = max(1, round(1.5 * scale))
     if field.border is not None:
-        _draw_paths(canvas, view, _in_pieces(field.border.points)[None], _BORDER, thin)
+        _draw_paths(canvas, view, _in_pieces(field.border.points)[None], BORDER, thin)
     if field.lines:
         ends = np.stack([each.ends for each in field.lines])
         _draw_paths(canvas, view, _in_pieces(ends.swapaxes(0, 1)).swapaxes(0, 1), _LINE, thin)
     if field.circle is not None:
-        _draw_paths(canvas, view, _circle(field.circle)[None], _LINE, thin)
+        _draw_paths(canvas, view, field.circle.outline[None], _LINE, thin)
     for left, right in field.goals:
         ends = np.stack([field.posts[left].position, field.posts[right].position])
-        _draw_paths(canvas, view, _in_pieces(ends)[None], _POST, thin)
+        _draw_paths(canvas, view, _in_pieces(ends)[None], POST, thin)
     for each, color in _uprights(field):
         _draw_paths(canvas, view, _base(each)[None], INK, 2 * thin + 3)
         _draw_paths(canvas, view, _base(each)[None], color, 2 * thin + 1)
@@ -53,7 +53,7 @@ def label_field(labels: Labels, field: FieldFeatures, view: PreparedView) -> Non
 
 
 def _uprights(field: FieldFeatures) -> list[tuple[Upright, Color]]:
-    return [*((each, _POST) for each in field.posts), *((each, _ROBOT) for each in field.robots)]
+    return [*((each, POST) for each in field.posts), *((each, ROBOT) for each in field.robots)]
 
 
 def _crossing_pixels(field: FieldFeatures, view: PreparedView) -> Floats:
@@ -67,12 +67,6 @@ def _in_pieces(points: Floats) -> Floats:
     whole = np.minimum(places.astype(np.intp), max(len(points) - 2, 0))
     rest = (places - whole).reshape(-1, *[1] * (points.ndim - 1))
     return np.asarray(points[whole] * (1.0 - rest) + points[np.minimum(whole + 1, len(points) - 1)] * rest)
-
-
-def _circle(circle: CenterCircle) -> Floats:
-    """Points (n, 2) [m] around a circle, the last as the first."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 97)
-    return np.asarray(circle.center + circle.radius * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
 def _base(upright: Upright) -> Floats:

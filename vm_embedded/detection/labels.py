@@ -12,6 +12,7 @@ Color = tuple[int, int, int]
 """Blue, green, red."""
 
 INK: Color = (30, 30, 30)
+OBJECT: Color = (60, 220, 255)
 
 _SIDES = (
     *((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, -1), (1, 1), (-1, 1)),

@@ -11,12 +11,12 @@ from ..arrays import Image
 from ..field.features import FieldFeatures
 from .detection import Detection
 from .field_overlay import FARTHEST, draw_field, label_field
-from .labels import INK, Color, Labels
+from .labels import INK, OBJECT, Color, Labels
 from .observation import Observation
 from .prepared_view import PreparedView
 
 # Colors are BGR. Objects stand out; classes that cover areas are pale.
-_OBJECT, _REJECTED = (60, 220, 255), (90, 90, 255)
+_REJECTED = (90, 90, 255)
 _HORIZON = (190, 190, 240)
 _UPRIGHT, _OTHER = (255, 120, 60), (140, 140, 140)
 _AREAS = ((255, 255, 255), (190, 255, 170), (230, 160, 230), (220, 220, 120))
@@ -49,7 +49,7 @@ def draw_overlay(
     _draw_points(canvas, observation, threshold)
     if field is not None:
         draw_field(canvas, field, observation.view, scale)
-    drawn = [(each, _OBJECT) for each in objects] + [(each, _REJECTED) for each in rejected]
+    drawn = [(each, OBJECT) for each in objects] + [(each, _REJECTED) for each in rejected]
     drawn = [(each, color) for each, color in drawn if np.abs(each.outline).max(initial=0.0) < FARTHEST]
     for each, color in reversed(drawn):
         _draw_outline(canvas, each, color, scale)
@@ -88,7 +88,7 @@ def _draw_points(canvas: Image, observation: Observation, threshold: float) -> N
             areas += 1
         elif each.kind != "background":
             for shift in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)):
-                _draw_pixels(canvas, chosen + shift, _OBJECT if each.kind == "object" else _UPRIGHT)
+                _draw_pixels(canvas, chosen + shift, OBJECT if each.kind == "object" else _UPRIGHT)
 
 
 def _draw_pixels(canvas: Image, pixels: np.ndarray, color: Color) -> None:
@@ -115,7 +115,7 @@ def _draw_arrow(canvas: Image, detection: Detection, view: PreparedView, scale: 
         start, end = np.rint(pixels).astype(int).tolist()
         thickness = max(1, round(2 * scale))
         cv2.arrowedLine(canvas, start, end, INK, thickness + 2, cv2.LINE_AA, tipLength=0.2)
-        cv2.arrowedLine(canvas, start, end, _OBJECT, thickness, cv2.LINE_AA, tipLength=0.2)
+        cv2.arrowedLine(canvas, start, end, OBJECT, thickness, cv2.LINE_AA, tipLength=0.2)
 
 
 def _label(labels: Labels, detection: Detection, color: Color) -> None:

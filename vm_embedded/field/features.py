@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
 from ..arrays import Floats, Singles
 from ..borders.records import SHARE, SIZE, Record, Sent
 
@@ -64,6 +66,12 @@ class CenterCircle(Record):
     radius: Annotated[float, SIZE]
     arc: Annotated[float, Sent(2, least=0)]
     confidence: Annotated[float, SHARE]
+
+    @property
+    def outline(self) -> Floats:
+        """Points (97, 2) [m] around the circle, the last as the first."""
+        angles = np.linspace(0.0, 2.0 * np.pi, 97)
+        return np.asarray(self.center + self.radius * np.column_stack([np.cos(angles), np.sin(angles)]))
 
 
 @dataclass(frozen=True, eq=False)

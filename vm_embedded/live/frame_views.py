@@ -9,11 +9,13 @@ import json
 from contextlib import suppress
 
 import cv2
+import numpy as np
 
 from ..detection.detections import Detections
+from ..detection.field_of_view import field_of_view
 from ..detection.overlay import draw_horizon
+from ..output.messages import Message
 from .http_server import Query, Response, Write
-from .overhead_map import overhead_map
 
 _BOUNDARY = b"--picture"
 _QUALITY = 80
@@ -45,7 +47,7 @@ class FrameViews:
         self._changed.set()
 
     async def map(self, _: Query) -> Response:
-        """The overhead map as JSON, see overhead_map.py; null before the first frame."""
+        """The overhead map as JSON, see `overhead_map`; null before the first frame."""
         return Response("application/json", await self._map(self.latest))
 
     async def view(self, query: Query) -> Response:
@@ -119,3 +121,20 @@ def _jpeg(detections: Detections) -> bytes:
 
 def _map_json(detections: Detections) -> bytes:
     return json.dumps(overhead_map(detections), allow_nan=False, separators=(",", ":")).encode()
+
+
+def overhead_map(detections: Detections) -> Message:
+    """The map of a frame, ready for JSON. Places are in the plane's frame, as in Detection.
+
+    yaw [rad]: direction of the camera, counterclockwise from the x axis. radius [m]: of the object that is sought.
+    view: polygons (m, 2) [m] around the part of the plane that the picture shows; fill them by the even-odd rule.
+    detections, field: as in messages; field is None for a network without its classes.
+    """
+    view = detections.observation.view
+    return {
+        "yaw": round(float(np.arctan2(view.heading[1, 0], view.heading[0, 0])), 4),
+        "radius": view.shape.radius,
+        "view": [np.round(each, 2).tolist() for each in field_of_view(view)],
+        "detections": [each.as_dict() for each in detections],
+        "field": None if detections.field is None else detections.field.as_dict(),
+    }

@@ -1,4 +1,4 @@
-"""Files with the results of a frame: mesh points, and pictures, also with the detections drawn in."""
+"""Files with the results of a frame: mesh points, and pictures: the frame with the detections drawn in, and a map."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..arrays import Image
 from ..cameras.frame_source import Frame
 from ..detection.detections import Detections
 from ..errors import InputError
-from ..files import atomic_write, is_file
+from ..files import atomic_write, is_file, write_file
 
 # Smaller and faster than the default strategy for pictures with noise.
 _PNG = (cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY)
@@ -28,9 +28,19 @@ def save_overlay(path: Path, frame: Frame, detections: Detections) -> None:
 
     Raises InputError instead of replacing a file in the folder of the frame's own image.
     """
-    if frame.path is not None and is_file(path) and path.resolve().parent == frame.path.resolve().parent:
-        raise InputError(f"--save-overlay would replace {path}: give another folder")
+    _check_beside(path, frame, "--save-overlay")
     detections.save(path)
+
+
+def save_map(path: Path, frame: Frame, detections: Detections) -> None:
+    """Write a .png: what the frame shows, from above. Raises InputError as `save_overlay` does."""
+    _check_beside(path, frame, "--save-map")
+    write_file(path, cv2.imencode(".png", detections.draw_map())[1].tobytes())
+
+
+def _check_beside(path: Path, frame: Frame, option: str) -> None:
+    if frame.path is not None and is_file(path) and path.resolve().parent == frame.path.resolve().parent:
+        raise InputError(f"{option} would replace {path}: give another folder")
 
 
 class FrameNames:

@@ -59,7 +59,7 @@ def run_boxes(options: argparse.Namespace) -> int:
     if search is None and settings.object_radius is None and (radius := _radius_of(frames)):
         settings = replace(settings, object_radius=radius)
         _complain([f"object radius {radius} m, from {OBJECT}"])
-    bar = ProgressBar(len(frames) * len(models), "vm-evaluate")
+    bar = ProgressBar(len(frames) * len(models), "vm-evaluate", unit="frames")
     try:
         workers = options.workers or len(os.sched_getaffinity(0))
         trials = [Trial(each, model.path, settings, search) for each, model in models.items()]

@@ -64,7 +64,7 @@ def run_import(options: argparse.Namespace) -> int:
     """Import as the options say and return the exit status. Raises InputError, also if no picture was imported."""
     from ..formats.importing import import_pictures
 
-    bar = ProgressBar(100)
+    bar = ProgressBar(100, unit="%")
     try:
         result = import_pictures(
             options.files,

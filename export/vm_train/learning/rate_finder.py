@@ -51,7 +51,7 @@ def find_rate(run: MeshRun, hardware: Hardware, network: MeshNetwork, steps: int
     peaks = run.configuration.peak_numbers
     trainer = Trainer(network, recipe, len(batches), *run.shares_and_weights(1), device=hardware.device, peaks=peaks)
     rates = np.geomspace(LOWEST, HIGHEST, len(batches))
-    bar = ProgressBar(len(batches), "vm-train")
+    bar = ProgressBar(len(batches), "vm-train", unit="steps")
     losses: list[float] = []
     average = 0.0
     loaded = load_batches(run.graphs(training), batches, hardware.workers)

@@ -147,7 +147,7 @@ class _Round:
             training.learner.load(state)
             training.kept = dict(state["kept"])
         learner = training.learner
-        self._bar = ProgressBar(learner.total, "vm-train", learner.done)
+        self._bar = ProgressBar(learner.total, "vm-train", learner.done, "steps")
         log = TrainingLog(
             training.run.folder, progress.round, learner.done, progress.validated, self._hardware.is_leader
         )

@@ -173,7 +173,7 @@ class Tuning(Training):
             print(f"{run.result_path}: not measured, because no frames were held out")
             return
         part = "the test" if run.split.test else "validation"
-        print(f"{run.result_path}: in {len(frames)} frames for {part}, it finds {found_of(scores[1])}")
+        print(f"{run.result_path}: in {len(frames)} frames for {part}, the look alone finds {found_of(scores[1])}")
         print(f"before the fine-tuning: {found_of(scores[0])}")
 
 

@@ -73,6 +73,7 @@ def test_the_programs_own_control_sequences_reach_the_terminal(monkeypatch):
         print(ESCAPE, file=sys.stderr)
         bar.clear()
     assert terminal.getvalue().startswith("\r\x1b[K\r[")
+    assert "] 1/10 pictures, 0:00:0" in terminal.getvalue()
     assert "\\x1b]0;owned\\x07\\x1b[2J\n" in terminal.getvalue()
     assert set(re.findall("\x1b.*?[A-Za-z]", terminal.getvalue())) == {"\x1b[K"}
 

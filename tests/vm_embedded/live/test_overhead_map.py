@@ -12,10 +12,10 @@ import pytest
 
 from tests.vm_embedded.output.features import demo_frame, scene
 from vm_embedded import Detector, Equidistant, Orientation, Rectilinear
+from vm_embedded.detection.field_of_view import REACH, field_of_view
 from vm_embedded.detection.overlay import draw_horizon
 from vm_embedded.live import frame_views
-from vm_embedded.live.frame_views import FrameViews
-from vm_embedded.live.overhead_map import REACH, field_of_view, overhead_map
+from vm_embedded.live.frame_views import FrameViews, overhead_map
 
 
 def inside(polygons, places):

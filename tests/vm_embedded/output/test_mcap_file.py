@@ -2,6 +2,7 @@
 
 import signal
 import subprocess
+from collections import Counter
 from functools import partial
 
 import cv2
@@ -12,6 +13,10 @@ from rosbags.highlevel import AnyReader
 from tests.programs import limit_files
 from tests.vm_embedded.cameras.ros.rolling_ball import Scene
 from tests.vm_embedded.cli.commands import COMMAND, lines, one_complaint, run
+from tests.vm_embedded.output.features import DEMO
+from vm_embedded import read_lens_file
+from vm_embedded.cameras.ros.bags import BagReading, open_bag
+from vm_embedded.output.ros.topics import TOPICS
 
 
 def messages_of(path):
@@ -76,6 +81,49 @@ def test_the_file_is_a_bag_with_lens_and_poses(tmp_path, scene_folder):
     for one, other in zip(first, again, strict=True):
         for each, found in zip(one["detections"], other["detections"], strict=True):
             assert np.abs(np.subtract(each["position"], found["position"])).max() < 0.02  # the pictures are JPEG
+
+
+def test_each_lens_and_pose_of_the_demo_is_read_back(tmp_path):
+    """Of all projections, with and without distortion, also where a jump of one camera would be impossible."""
+    done = run(DEMO, "--save-mcap", tmp_path / "out.mcap")
+    frames = list(open_bag(str(tmp_path / "out.mcap"), BagReading()).frames)
+    assert len(frames) == len(lines(done)) == 12
+    for path, frame in zip(sorted(DEMO.glob("lens*.yaml")), frames, strict=True):
+        file, image = read_lens_file(path), frame.read()
+        size = image.shape[1::-1]
+        pixels = np.random.default_rng(1).uniform(0.0, np.array(size) - 1.0, (200, 2))
+        rays = file.lens.unproject(pixels, size)
+        seen = np.isfinite(rays).all(axis=1)
+        seen[seen] = file.lens.sees(rays[seen])
+        assert np.abs(frame.lens.project(rays[seen], size) - pixels[seen]).max() < 0.1
+        assert np.allclose(frame.orientation.rotation, file.orientation.rotation, atol=1e-9)
+        assert np.isclose(frame.orientation.height, file.orientation.height)
+
+
+def test_all_features_are_in_the_file(tmp_path):
+    """rosbags reads as many of each as the lines of JSON have."""
+    done = run(DEMO, "--model", "soccer", "--save-mcap", tmp_path / "out.mcap", "--save-map", tmp_path / "maps")
+    found = messages_of(tmp_path / "out.mcap")
+    assert {f"/vm_ros/{name}" for name in TOPICS} <= found.keys()
+    count = Counter()
+    for number, line in enumerate(lines(done)):
+        field = line["field"]
+        balls, posts, robots, marks, border, drawn = (
+            found[f"/vm_ros/{name}"][number]
+            for name in ("balls", "goalposts", "robots", "markings", "field_boundary", "map/compressed")
+        )
+        things = (
+            *((balls.balls, line["detections"]), (posts.posts, field["posts"]), (robots.robots, field["robots"])),
+            *((marks.segments, field["lines"]), (marks.intersections, field["crossings"])),
+            *((marks.ellipses, [field["circle"]] * bool(field["circle"])),),
+            (border.points, field["border"]["points"] if field["border"] else []),
+        )
+        for kind, (one, other) in enumerate(things):
+            assert len(one) == len(other)
+            count[kind] += len(one)
+        picture = cv2.imdecode(drawn.data, cv2.IMREAD_COLOR)
+        assert picture.shape == cv2.imread(str(tmp_path / "maps" / f"image{number:07d}-map.png")).shape
+    assert all(count[kind] for kind in range(7)), count
 
 
 def test_the_stamps_of_a_bag_stay(tmp_path):

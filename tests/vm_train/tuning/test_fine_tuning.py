@@ -51,7 +51,9 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
             r"loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
             lines[1 + epoch],
         )
-    assert re.search(r"model.onnx: in 4 frames for the test, it finds \d+ of \d+ boxes and \d+ false", lines[4])
+    assert re.search(
+        r"model.onnx: in 4 frames for the test, the look alone finds \d+ of \d+ boxes and \d+ false", lines[4]
+    )
     assert lines[6:] == [
         f"report: {folder / 'report.html'}",
         f"next: vm-evaluate --boxes {frames} --names 0=ball --list {folder / 'pictures.json'} ball "

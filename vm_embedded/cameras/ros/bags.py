@@ -27,7 +27,7 @@ from .camera_poses import newest_pose, orientation_of
 from .images import image_of
 from .lens import lens_of, rectified_doubt
 from .message_fields import MESSAGES
-from .settings import RosSettings, camera_info_beside
+from .settings import DRAWN, RosSettings, camera_info_beside
 from .stamps import seconds_of
 from .transforms import Transform, TransformTree
 from .unfinished import UnfinishedMcap, is_finished
@@ -96,7 +96,7 @@ def open_bag(name: str, reading: BagReading) -> Source:
         place, reason = getattr(error, "filename", None) or name, getattr(error, "strerror", None) or one_line(error)
         raise InputError(f"can't read bag {place}: {reason}") from error
     try:
-        images = _image_topic(name, reader, reading.ros.image)
+        images = _image_topic(name, reader, reading.ros)
         info = reading.ros.camera_info or camera_info_beside(images)
         _check_topics(name, reader, reading, info)
     except InputError as error:
@@ -129,9 +129,15 @@ def _parts(path: Path) -> tuple[list[Any], list[str]]:
     return parts, [f"the recording {path.name} was not finished{cut}"]
 
 
-def _image_topic(name: str, reader: Any, chosen: str) -> str:
-    """The topic of the images. Raises InputError for one that the bag lacks, or if there are several."""
-    topics = sorted(topic for topic, info in reader.topics.items() if info.msgtype in _IMAGES and info.msgcount)
+def _image_topic(name: str, reader: Any, ros: RosSettings) -> str:
+    """The topic of the images that no vm-ros has drawn. Raises InputError for one that the bag lacks, or if there are
+    several."""
+    drawn, chosen = [f"{ros.namespace.rstrip('/')}/{each}" for each in DRAWN], ros.image
+    topics = sorted(
+        topic
+        for topic, info in reader.topics.items()
+        if info.msgtype in _IMAGES and info.msgcount and topic not in drawn
+    )
     if not topics:
         raise InputError(f"bag {name} has no images (its topics: {', '.join(sorted(reader.topics)) or 'none'})")
     if chosen and chosen not in topics:

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from ...errors import InputError
 from ...geometry.calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
 from ...geometry.lens import Lens
 from ...geometry.lens_files import lens_from_calibration
-from ...geometry.radial_lenses import Rectilinear
+from ...geometry.radial_lenses import RadialLens, Rectilinear, projection_named
+
+_LARGEST_ERROR = 0.1
+"""Largest error of a radial lens as ROS describes it [px]."""
+
+_OWN = "vm_"
+"""Distortion models that begin so are the projections of radial lenses, with k0 [px^-2], k1 [px^-4] and fov [rad]."""
 
 
 def lens_of(message: Any) -> Lens:
@@ -27,12 +36,29 @@ def lens_of(message: Any) -> Lens:
         "width": int(message.width),
         "height": int(message.height),
     }
+    if message.distortion_model.startswith(_OWN):
+        return _own_lens(message)
     if message.distortion_model:
         table["distortion_model"] = message.distortion_model
     try:
         return lens_from_calibration(table)
     except InputError as error:
         raise InputError(f"camera_info: {error}") from error
+
+
+def _own_lens(message: Any) -> Lens:
+    """The radial lens of a CameraInfo that `camera_info_message` has made. Raises InputError."""
+    size = int(message.width), int(message.height)
+    if len(message.d) != 3:
+        raise InputError(f"camera_info: {message.distortion_model} needs 3 coefficients, not {len(message.d)}")
+    k0, k1, fov = map(float, message.d)
+    return projection_named(message.distortion_model.removeprefix(_OWN))(
+        focal_length=float(message.k[0]),
+        center=(0.5 * size[0] - float(message.k[2]), 0.5 * size[1] - float(message.k[5])),
+        distortion=(k0, k1),
+        fov=fov,
+        size=size,
+    )
 
 
 def rectified_doubt(topic: str, lens: Lens) -> str:
@@ -51,19 +77,30 @@ def rectified_doubt(topic: str, lens: Lens) -> str:
     )
 
 
-def camera_info_message(types: Any, header: Any, lens: Lens, size: tuple[int, int]) -> Any | None:
-    """The CameraInfo of a calibrated lens; None for others, which ROS can't describe. size: of the images [px]."""
-    if not isinstance(lens, CalibratedLens):
-        return None
-    (fx, fy), (cx, cy) = lens.focal_lengths, lens.optical_center
-    count = len(lens.coefficients)
-    model = "equidistant" if isinstance(lens, FisheyeLens) else "plumb_bob" if count <= 5 else "rational_polynomial"
+def camera_info_message(types: Any, header: Any, lens: Lens, size: tuple[int, int]) -> Any:
+    """The CameraInfo of a lens for images of this size [px]; `lens_of` reads it.
+
+    A radial lens becomes plumb_bob or equidistant, if that is at most 0.1 px off anywhere in the image. Otherwise the
+    distortion model has a name that only `lens_of` knows.
+    """
+    lens = _as_calibrated(lens, size)
+    coefficients: tuple[float, ...]
+    if isinstance(lens, RadialLens):
+        model, coefficients = _OWN + type(lens).__name__.lower(), (*lens.distortion, lens.fov)
+        (fx, fy), (cx, cy) = (lens.scale, lens.scale), lens.project(np.array([[1.0, 0.0, 0.0]]), size)[0].tolist()
+    elif isinstance(lens, CalibratedLens):
+        (fx, fy), (cx, cy) = lens.focal_lengths, lens.optical_center
+        coefficients = lens.coefficients or (0.0,) * (4 if isinstance(lens, FisheyeLens) else 5)
+        straight = "plumb_bob" if len(coefficients) <= 5 else "rational_polynomial"
+        model = "equidistant" if isinstance(lens, FisheyeLens) else straight
+    else:
+        raise InputError(f"lens of type {type(lens).__name__} has no CameraInfo; use a radial or a calibrated lens")
     return types.CameraInfo(
         header=header,
         height=size[1],
         width=size[0],
         distortion_model=model,
-        d=types.doubles(lens.coefficients),
+        d=types.doubles(coefficients),
         k=types.doubles([fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]),
         r=types.doubles([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
         p=types.doubles([fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0]),
@@ -71,3 +108,33 @@ def camera_info_message(types: Any, header: Any, lens: Lens, size: tuple[int, in
         binning_y=0,
         roi=types.RegionOfInterest(x_offset=0, y_offset=0, height=0, width=0, do_rectify=False),
     )
+
+
+@lru_cache(16)
+def _as_calibrated(lens: Lens, size: tuple[int, int]) -> Lens:
+    """A lens for images of this size [px]: a radial one with its distortion fitted as OpenCV describes it, if it is
+    near enough."""
+    lens = lens.for_image(size)
+    if not isinstance(lens, RadialLens):
+        return lens
+    theta = np.linspace(0.0, 0.999 * lens.limit, 1000)
+    rays = np.column_stack([np.cos(theta), -np.sin(theta), np.zeros_like(theta)])
+    pixels = lens.project(rays, size)
+    center, radius = pixels[0], pixels[:, 0] - pixels[0, 0]
+    inside = radius <= np.hypot(*np.maximum(center, size - center))
+    theta, rays, radius = theta[inside], rays[inside], radius[inside] / lens.scale
+    is_straight = isinstance(lens, Rectilinear)
+    plain = np.tan(theta) if is_straight else theta
+    share = plain / plain[-1]  # for powers of the same size
+    powers = np.arange(3, 9 if is_straight else 11, 2)
+    found = np.linalg.lstsq(share[:, None] ** powers, radius - plain, rcond=None)[0] / plain[-1] ** powers
+    kind: type[CalibratedLens] = BrownLens if is_straight else FisheyeLens
+    fitted = kind(
+        fov=lens.fov,
+        focal_lengths=(lens.scale, lens.scale),
+        optical_center=center,
+        coefficients=(*found[:2], 0.0, 0.0, found[2]) if is_straight else found,
+        size=size,
+    )
+    error = np.abs(fitted.project(rays, size)[:, 0] - pixels[inside, 0]).max()
+    return fitted if error <= _LARGEST_ERROR and fitted.limit >= 0.99 * theta[-1] else lens

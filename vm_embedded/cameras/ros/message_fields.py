@@ -1,19 +1,22 @@
 """The messages of ROS 2 that this project reads and writes: their fields in the order of their .msg files.
 
-vision_msgs is that of ROS 2 Humble and later. Tests compare the bytes of each message with those of the library
-rosbags.
+vision_msgs and visualization_msgs are those of ROS 2 Humble and later. Tests compare the bytes of each message with
+those of the library rosbags.
 """
 
 from __future__ import annotations
 
 FIELDS = {
     "builtin_interfaces/msg/Time": "int32 sec, uint32 nanosec",
+    "builtin_interfaces/msg/Duration": "int32 sec, uint32 nanosec",
     "std_msgs/msg/Header": "Time stamp, string frame_id",
+    "std_msgs/msg/ColorRGBA": "float32 r, float32 g, float32 b, float32 a",
     "geometry_msgs/msg/Point": "float64 x, float64 y, float64 z",
     "geometry_msgs/msg/Quaternion": "float64 x, float64 y, float64 z, float64 w",
     "geometry_msgs/msg/Vector3": "float64 x, float64 y, float64 z",
     "geometry_msgs/msg/Pose": "Point position, Quaternion orientation",
     "geometry_msgs/msg/PoseStamped": "Header header, Pose pose",
+    "geometry_msgs/msg/PoseArray": "Header header, Pose[] poses",
     "geometry_msgs/msg/PoseWithCovariance": "Pose pose, float64[36] covariance",
     "geometry_msgs/msg/Transform": "Vector3 translation, Quaternion rotation",
     "geometry_msgs/msg/TransformStamped": "Header header, string child_frame_id, Transform transform",
@@ -35,6 +38,29 @@ FIELDS = {
     "vision_msgs/msg/Detection2DArray": "Header header, Detection2D[] detections",
     "vision_msgs/msg/Detection3D": "Header header, ObjectHypothesisWithPose[] results, BoundingBox3D bbox, string id",
     "vision_msgs/msg/Detection3DArray": "Header header, Detection3D[] detections",
+    "soccer_vision_attribute_msgs/msg/Confidence": "float32 confidence",
+    "soccer_vision_attribute_msgs/msg/Goalpost": "uint8 side, uint8 team",
+    "soccer_vision_attribute_msgs/msg/Robot": "uint8 player_number, uint8 team, uint8 state, uint8 facing",
+    "soccer_vision_3d_msgs/msg/Ball": "Point center, Confidence confidence",
+    "soccer_vision_3d_msgs/msg/BallArray": "Header header, Ball[] balls",
+    "soccer_vision_3d_msgs/msg/Goalpost": "BoundingBox3D bb, GoalpostAttributes attributes, Confidence confidence",
+    "soccer_vision_3d_msgs/msg/GoalpostArray": "Header header, Goalpost[] posts",
+    "soccer_vision_3d_msgs/msg/Robot": "BoundingBox3D bb, RobotAttributes attributes, Confidence confidence",
+    "soccer_vision_3d_msgs/msg/RobotArray": "Header header, Robot[] robots",
+    "soccer_vision_3d_msgs/msg/MarkingEllipse": "float64 diameter, Pose center, Confidence confidence",
+    "soccer_vision_3d_msgs/msg/MarkingIntersection": "Point center, int32 num_rays, Vector3[] rays, "
+    "Confidence confidence",
+    "soccer_vision_3d_msgs/msg/MarkingSegment": "Point start, Point end, Confidence confidence",
+    "soccer_vision_3d_msgs/msg/MarkingArray": "Header header, MarkingEllipse[] ellipses, "
+    "MarkingIntersection[] intersections, MarkingSegment[] segments",
+    "soccer_vision_3d_msgs/msg/FieldBoundary": "Header header, Point[] points, Confidence confidence",
+    "visualization_msgs/msg/UVCoordinate": "float32 u, float32 v",
+    "visualization_msgs/msg/MeshFile": "string filename, uint8[] data",
+    "visualization_msgs/msg/Marker": "Header header, string ns, int32 id, int32 type, int32 action, Pose pose, "
+    "Vector3 scale, ColorRGBA color, Duration lifetime, bool frame_locked, Point[] points, ColorRGBA[] colors, "
+    "string texture_resource, CompressedImage texture, UVCoordinate[] uv_coordinates, string text, "
+    "string mesh_resource, MeshFile mesh_file, bool mesh_use_embedded_materials",
+    "visualization_msgs/msg/MarkerArray": "Marker[] markers",
     "diagnostic_msgs/msg/KeyValue": "string key, string value",
     "diagnostic_msgs/msg/DiagnosticStatus": "byte level, string name, string message, string hardware_id, "
     "KeyValue[] values",
@@ -57,8 +83,15 @@ _FOXGLOVE_FIELDS = {
 }
 """The same for the messages that Foxglove draws over images. They are only in files."""
 
-MESSAGES = {full.rpartition("/")[2]: full for full in FIELDS | _FOXGLOVE_FIELDS}
-"""The full name of each message by its short name, which is unique."""
+
+def short_name(full: str) -> str:
+    """The unique short name of a message: the last part of its full name; that of attributes ends in Attributes."""
+    package, _, name = full.split("/")
+    return f"{name}Attributes" if package == "soccer_vision_attribute_msgs" and name != "Confidence" else name
+
+
+MESSAGES = {short_name(full): full for full in FIELDS | _FOXGLOVE_FIELDS}
+"""The full name of each message by its short name."""
 
 
 def fields_of(full: str) -> list[tuple[str, str]]:

@@ -11,6 +11,9 @@ CLOCKS = ("wall", "arrival")
 NODE = "vm_ros"
 """Name of the node, and first part of the topics that it publishes."""
 
+DRAWN = DEBUG_IMAGE, MAP = ("debug_image/compressed", "map/compressed")
+"""The topics of images that it draws."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RosSettings:
@@ -27,6 +30,11 @@ class RosSettings:
         "wall",
         "clock of the stamps; wall: the system's clock; arrival: another clock, as when a bag is played; its offset is "
         "estimated from the times of arrival",
+    )
+    middleware: str = one_of(
+        ("auto", "rclpy", "cyclonedds"),
+        "auto",
+        "package that connects vm-ros to ROS 2; auto: rclpy where ROS is sourced, otherwise cyclonedds",
     )
     namespace: str = text_line(f"/{NODE}", "first part of the topics that vm-ros publishes")
 

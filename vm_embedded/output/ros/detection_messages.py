@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,43 +20,63 @@ _LEVELS = {"ok": "OK", "starting": "WARN", "degraded": "WARN", "stopping": "WARN
 """Levels of a DiagnosticStatus for states; the others, without detections, are errors."""
 
 
+@dataclass(frozen=True, eq=False)
+class FrameResults:
+    """What the messages of a frame are made from.
+
+    in_image, on_plane: std_msgs/Header with the stamp of the image, and the frame of the camera, with optical axes, or
+    of the observation plane. orientation: that the detections were computed with. offset (2,) [m]: where the camera is
+    in the frame of the plane; zeros if its origin is below the camera.
+    """
+
+    types: Any
+    in_image: Any
+    on_plane: Any
+    detections: Detections
+    orientation: Orientation
+    offset: Floats
+
+    def point(self, position: Floats) -> Any:
+        """A geometry_msgs/Point at a position (2,) or (3,) [m] of Detections."""
+        x, y, *z = position.tolist()
+        return self.types.Point(x=x + float(self.offset[0]), y=y + float(self.offset[1]), z=z[0] if z else 0.0)
+
+    def pose(self, position: Floats) -> Any:
+        """A geometry_msgs/Pose at a position as that of `point`, not rotated."""
+        return _pose(self.types, self.point(position))
+
+
 def header_of(types: Any, stamp: Any, frame_id: str) -> Any:
     """A std_msgs/Header."""
     return types.Header(stamp=stamp, frame_id=frame_id)
 
 
-def detection_2d_array(types: Any, header: Any, detections: Detections, orientation: Orientation) -> Any:
-    """A Detection2DArray: boxes in the image [px], and positions in the camera's optical frame [m].
-
-    header: of the image. orientation: that the detections were computed with.
-    """
-    return types.Detection2DArray(
-        header=header, detections=[_detection_2d(types, header, each, orientation) for each in detections]
+def detection_2d_array(frame: FrameResults) -> Any:
+    """A Detection2DArray: boxes in the image [px], and positions in the camera's optical frame [m]."""
+    return frame.types.Detection2DArray(
+        header=frame.in_image, detections=[_detection_2d(frame, each) for each in frame.detections]
     )
 
 
-def detection_3d_array(types: Any, header: Any, detections: Detections, offset: Floats) -> Any:
-    """A Detection3DArray: positions and boxes in the frame of the observation plane [m].
-
-    header: with the stamp of the image, and the frame of the plane. offset (2,) [m]: where the camera is in that frame;
-    zeros if its origin is below the camera.
-    """
-    side = 2.0 * detections.manifest.object_radius
-    return types.Detection3DArray(
-        header=header, detections=[_detection_3d(types, header, each, offset, side) for each in detections]
+def detection_3d_array(frame: FrameResults) -> Any:
+    """A Detection3DArray: positions and boxes in the frame of the observation plane [m]."""
+    return frame.types.Detection3DArray(
+        header=frame.on_plane, detections=[_detection_3d(frame, each) for each in frame.detections]
     )
 
 
-def _detection_2d(types: Any, header: Any, detection: Detection, orientation: Orientation) -> Any:
+def _detection_2d(frame: FrameResults, detection: Detection) -> Any:
+    types = frame.types
     around = np.array([detection.center - detection.radius, detection.center + detection.radius])
     points = detection.outline if len(detection.outline) else around
     low, high = points.min(axis=0), points.max(axis=0)
     (x, y), (width, height) = 0.5 * (low + high), high - low
     # The bearing leads from the camera to the object, in the plane's frame.
-    position = detection.distance * (orientation.rotation @ OPTICAL_TO_CAMERA).T @ detection.bearing
+    position = detection.distance * (frame.orientation.rotation @ OPTICAL_TO_CAMERA).T @ detection.bearing
+    pose = _pose(types, types.Point(**dict(zip("xyz", position.tolist(), strict=True))))
     return types.Detection2D(
-        header=header,
-        results=[_hypothesis(types, detection, position)],
+        header=frame.in_image,
+        results=[_hypothesis(types, detection, pose)],
         bbox=types.BoundingBox2D(
             center=types.Pose2D(position=types.Point2D(x=float(x), y=float(y)), theta=0.0),
             size_x=float(width),
@@ -65,12 +86,12 @@ def _detection_2d(types: Any, header: Any, detection: Detection, orientation: Or
     )
 
 
-def _detection_3d(types: Any, header: Any, detection: Detection, offset: Floats, side: float) -> Any:
-    position = detection.position + np.append(offset, 0.0)
+def _detection_3d(frame: FrameResults, detection: Detection) -> Any:
+    types, side = frame.types, 2.0 * frame.detections.manifest.object_radius
     return types.Detection3D(
-        header=header,
-        results=[_hypothesis(types, detection, position)],
-        bbox=types.BoundingBox3D(center=_pose_at(types, position), size=types.Vector3(x=side, y=side, z=side)),
+        header=frame.on_plane,
+        results=[_hypothesis(types, detection, frame.pose(detection.position))],
+        bbox=types.BoundingBox3D(center=frame.pose(detection.position), size=types.Vector3(x=side, y=side, z=side)),
         id=_track_id(detection),
     )
 
@@ -80,17 +101,15 @@ def _track_id(detection: Detection) -> str:
     return "" if detection.track is None else str(detection.track.id)
 
 
-def _hypothesis(types: Any, detection: Detection, position: Floats) -> Any:
+def _hypothesis(types: Any, detection: Detection, pose: Any) -> Any:
     return types.ObjectHypothesisWithPose(
         hypothesis=types.ObjectHypothesis(class_id=detection.class_name, score=float(detection.confidence)),
-        pose=types.PoseWithCovariance(pose=_pose_at(types, position), covariance=types.doubles([0.0] * 36)),
+        pose=types.PoseWithCovariance(pose=pose, covariance=types.doubles([0.0] * 36)),
     )
 
 
-def _pose_at(types: Any, position: Floats) -> Any:
-    """A geometry_msgs/Pose at a position (3,), not rotated."""
-    x, y, z = (float(each) for each in position)
-    return types.Pose(position=types.Point(x=x, y=y, z=z), orientation=types.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
+def _pose(types: Any, point: Any) -> Any:
+    return types.Pose(position=point, orientation=types.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
 
 
 def diagnostic_array(

@@ -17,7 +17,7 @@ from ...cameras.ros.bag_types import bag_types, import_rosbags, typestore
 from ...cameras.ros.images import jpeg_message
 from ...cameras.ros.lens import camera_info_message
 from ...cameras.ros.message_fields import MESSAGES
-from ...cameras.ros.settings import NODE
+from ...cameras.ros.settings import MAP, NODE
 from ...cameras.ros.stamps import stamp_of
 from ...cameras.ros.transforms import transform_message
 from ...detection.detections import Detections
@@ -26,11 +26,13 @@ from ...files import check_writable, put_in_place, real_path, unused_name
 from ...geometry.lens import Lens
 from ...geometry.orientation import Orientation
 from .annotations import image_annotations
-from .detection_messages import detection_2d_array, detection_3d_array, diagnostic_array, header_of
+from .detection_messages import FrameResults, diagnostic_array, header_of
+from .topics import TOPICS
 
 _CAMERA_FRAME = "camera_optical"
-_RATE = 30.0
-"""Frames per second of frames without a time [1/s]."""
+_RATE = 5.0
+"""Rate of frames without a time [1/s]: so slow that a bag's reader does not take the poses of unrelated images for
+jumps of one camera."""
 
 _ONE_DAY = 86400.0
 
@@ -77,18 +79,19 @@ class McapFile:
         in_image, on_plane = header_of(types, stamp, _CAMERA_FRAME), header_of(types, stamp, self._plane_frame)
         image = detections.observation.pyramid.bgr()
         height, width = image.shape[:2]
+        info = camera_info_message(types, in_image, lens, (width, height))
         pose = transform_message(types, on_plane, _CAMERA_FRAME, orientation)
         self._add(now, "/tf", "TFMessage", types.TFMessage(transforms=[pose]))
-        info = camera_info_message(types, in_image, lens, (width, height))
-        if info is not None:
-            self._add(now, "/camera/camera_info", "CameraInfo", info)
+        self._add(now, "/camera/camera_info", "CameraInfo", info)
         self._add(now, "/camera/image/compressed", "CompressedImage", jpeg_message(types, in_image, image))
-        for name, kind, message in (
-            ("detections_2d", "Detection2DArray", detection_2d_array(types, in_image, detections, orientation)),
-            ("detections_3d", "Detection3DArray", detection_3d_array(types, on_plane, detections, np.zeros(2))),
-            ("annotations", "ImageAnnotations", image_annotations(types, stamp, detections)),
-        ):
-            self._add(now, f"/{NODE}/{name}", kind, message)
+        results = FrameResults(types, in_image, on_plane, detections, orientation, np.zeros(2))
+        for name, (kind, make) in TOPICS.items():
+            message = make(results)
+            if message is not None:
+                self._add(now, f"/{NODE}/{name}", kind, message)
+        self._add(now, f"/{NODE}/annotations", "ImageAnnotations", image_annotations(types, stamp, detections))
+        drawn = jpeg_message(types, on_plane, detections.draw_map())
+        self._add(now, f"/{NODE}/{MAP}", "CompressedImage", drawn)
         self.write_state(frame, "ok", "")
 
     def write_state(self, frame: Frame, state: str, reason: str) -> None:

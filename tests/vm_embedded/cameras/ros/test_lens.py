@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from vm_embedded.cameras.ros.lens import camera_info_message, lens_of
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
-from vm_embedded.geometry.radial_lenses import Rectilinear
+from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 
 from .rolling_ball import LENS, SIZE, TYPES, camera_info, stamp
 
@@ -51,9 +51,26 @@ def test_the_lens_of_a_camera_info_has_its_numbers():
     assert lens_of(camera_info(0.0)) == LENS
 
 
-def test_a_lens_that_ros_cannot_describe_has_no_camera_info():
-    lens = Rectilinear(focal_length=400.0, fov=1.5)
-    assert camera_info_message(TYPES, HEADER, lens, SIZE) is None
+@pytest.mark.parametrize("kind", [Rectilinear, Equidistant, Equisolid])
+@given(
+    st.floats(150.0, 500.0),
+    st.tuples(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0)),
+    st.tuples(st.integers(-10, 10).map(lambda k: 1e-7 * k), st.integers(-9, 9).map(lambda k: 1e-13 * k)),
+    st.floats(0.5, 3.0),
+)
+def test_a_radial_lens_survives_camera_info(kind, focal_length, center, distortion, fov):
+    lens = kind(focal_length=focal_length, center=center, distortion=distortion, fov=fov)
+    message = camera_info_message(TYPES, HEADER, lens, SIZE)
+    again = lens_of(message)
+    x, y = np.meshgrid(np.linspace(0.0, SIZE[0] - 1.0, 23), np.linspace(0.0, SIZE[1] - 1.0, 19))
+    pixels = np.column_stack([x.ravel(), y.ravel()])
+    rays = lens.unproject(pixels, SIZE)
+    seen = np.isfinite(rays).all(axis=1)
+    seen[seen] = lens.sees(rays[seen])
+    assert again.sees(rays[seen]).sum() > 0.98 * seen.sum() - 2
+    assert np.abs(again.project(rays[seen], SIZE) - pixels[seen]).max(initial=0.0) < 0.15
+    if distortion == (0.0, 0.0):
+        assert message.distortion_model == ("plumb_bob" if kind is Rectilinear else "equidistant")
 
 
 @pytest.mark.parametrize(

@@ -1,36 +1,17 @@
-"""The overhead map of a frame: what it shows of the plane, and where the camera looks."""
+"""The field of view: which part of the plane a frame shows."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..arrays import Floats, Mask
-from ..detection.detections import Detections
-from ..detection.prepared_view import PreparedView
-from ..output.messages import Message
+from .prepared_view import PreparedView
 
 REACH = 12.0
 """Distance on the plane at which the field of view is cut [m]."""
 
 _AZIMUTHS, _STEPS, _HALVINGS = 360, 40, 8
 """Directions around the camera, steps from straight down to `REACH`, and halvings of the step at an edge."""
-
-
-def overhead_map(detections: Detections) -> Message:
-    """The map of a frame, ready for JSON. Places are in the plane's frame, as in Detection.
-
-    yaw [rad]: direction of the camera, counterclockwise from the x axis. radius [m]: of the object that is sought.
-    view: polygons (m, 2) [m] around the part of the plane that the picture shows; fill them by the even-odd rule.
-    detections, field: as in messages; field is None for a network without its classes.
-    """
-    view = detections.observation.view
-    return {
-        "yaw": round(float(np.arctan2(view.heading[1, 0], view.heading[0, 0])), 4),
-        "radius": view.shape.radius,
-        "view": [np.round(each, 2).tolist() for each in field_of_view(view)],
-        "detections": [each.as_dict() for each in detections],
-        "field": None if detections.field is None else detections.field.as_dict(),
-    }
 
 
 def field_of_view(view: PreparedView) -> list[Floats]:

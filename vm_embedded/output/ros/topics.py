@@ -1,0 +1,32 @@
+"""The topics with what a frame shows: one table for vm-ros, through rclpy or cyclonedds, and for MCAP files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from .detection_messages import FrameResults, detection_2d_array, detection_3d_array
+from .field_messages import (
+    ball_array,
+    field_boundary,
+    goalpost_array,
+    goalpost_poses,
+    marking_array,
+    robot_array,
+    robot_poses,
+)
+from .markers import marker_array
+
+TOPICS: dict[str, tuple[str, Callable[[FrameResults], Any | None]]] = {
+    "detections_2d": ("Detection2DArray", detection_2d_array),
+    "detections_3d": ("Detection3DArray", detection_3d_array),
+    "balls": ("BallArray", ball_array),
+    "goalposts": ("GoalpostArray", goalpost_array),
+    "robots": ("RobotArray", robot_array),
+    "markings": ("MarkingArray", marking_array),
+    "field_boundary": ("FieldBoundary", field_boundary),
+    "goalpost_poses": ("PoseArray", goalpost_poses),
+    "robot_poses": ("PoseArray", robot_poses),
+    "markers": ("MarkerArray", marker_array),
+}
+"""By the last part of its name: the short name of its message, and what makes it; None where the network has none."""
