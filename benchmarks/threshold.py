@@ -18,7 +18,7 @@ from itertools import product
 from pathlib import Path
 
 from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
-from vm_embedded.detection.at_peaks import judge_classes
+from vm_embedded.detection.looking import judge_classes
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.settings import Settings

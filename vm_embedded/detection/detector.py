@@ -12,10 +12,10 @@ from ..network.bundled import model_path
 from ..network.close_look import CloseLook
 from ..network.model_file import ModelFile, read_model
 from ..network.session import Session
-from .at_peaks import judge_classes
 from .cache import MeshCache
 from .detections import Detections
 from .field_points import locate_features
+from .looking import judge_classes
 from .objects import locate
 from .observation import Observation, observe
 from .pixel_formats import checked_image

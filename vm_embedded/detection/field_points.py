@@ -10,7 +10,7 @@ from ..field.features import FieldFeatures
 from ..field.find import find_features
 from ..field.ground_points import ROLES, GroundMap, GroundPoints, ground_map
 from ..mesh.mesh import Mesh
-from .at_peaks import Judged
+from .looking import Judged
 from .observation import Observation
 from .profiles import brightness_along
 from .upright_bases import uprights_at

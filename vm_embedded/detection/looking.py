@@ -7,18 +7,19 @@ probable the object is, where its center is, and how large it is.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from ..arrays import Floats, Image, Singles
+from ..field.features import UPRIGHTS
+from ..geometry.circle import Circle
 from ..network.look_contract import LookContract
 from .observation import Observation
-from .patches import Tangents
+from .patches import Tangents, cut_places
 from .peaks import LARGEST_SIZE, Peaks, probability_of
-from .places import cut_places
 from .prepared_view import PreparedView
 from .settings import Settings
 from .stopwatch import Stopwatch
@@ -74,6 +75,46 @@ class Sought:
     def best(self) -> Peaks:
         """The peaks that may be objects."""
         return self.peaks if self.look is None else self.peaks.part(slice(self.look.contract.max_proposals))
+
+
+def around_bases(observation: Observation, radius: float) -> PreparedView:
+    """The same points, where circles on the plane with this radius [m] are sought: one around each base."""
+    return observation.view._replace(shape=Circle(radius))
+
+
+def sought_bases(observation: Observation, class_name: str, look: Look | None) -> Sought:
+    """The bases of uprights of a class that the network has peaks for. look: the look network for the class, if any."""
+    radius = observation.manifest.radius if look is None else look.contract.upright_radius
+    view = around_bases(observation, radius)
+    return Sought(view, observation.peaks[class_name].apart(view), look)
+
+
+Judged = Mapping[str, tuple[Sought, list[Judgment]]]
+"""What was sought of each class, and what was found."""
+
+
+def judge_classes(
+    observation: Observation,
+    looks: Mapping[str, Look],
+    settings: Settings,
+    watch: Stopwatch,
+    explain: bool = False,
+    uprights: bool = True,
+) -> Judged:
+    """What is at the peaks of each class that the network has peaks for.
+
+    looks: look networks by class. uprights: also goal posts and robots. explain, watch: see `judge_peaks`. Raises
+    ModelError if a look network does not run.
+    """
+    sought = {}
+    for each in observation.manifest.classes:
+        name = each.name
+        if name in observation.manifest.peaks and each.kind == "object":
+            sought[name] = Sought(observation.view, observation.peaks[name], looks.get(name))
+        elif name in observation.manifest.peaks and uprights and name in UPRIGHTS:
+            sought[name] = sought_bases(observation, name, looks.get(name))
+    judged = judge_peaks(observation, list(sought.values()), settings, watch, explain)
+    return {name: (of, found) for (name, of), found in zip(sought.items(), judged, strict=True)}
 
 
 def judge_peaks(

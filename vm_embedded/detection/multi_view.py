@@ -12,9 +12,9 @@ from ..arrays import AnyImage, Floats
 from ..errors import GeometryError, InputError
 from ..geometry.lens import Lens
 from ..geometry.planes import GROUND, Plane, Pose
-from .at_peaks import judge_classes
 from .detection import Detection
 from .detector import Detector
+from .looking import judge_classes
 from .objects import locate
 from .stopwatch import Stopwatch
 

@@ -13,12 +13,11 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Singles
-from .at_peaks import Judged
 from .candidates import Candidate, propose
 from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
-from .looking import Judgment
+from .looking import Judged, Judgment
 from .observation import Observation
 from .projection import along
 from .settings import Settings

@@ -11,27 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..field.features import UPRIGHTS, Upright
-from ..geometry.circle import Circle
-from .looking import Judgment, Look, Sought
-from .observation import Observation
+from .looking import Judgment
 from .peaks import first_apart
 from .prepared_view import PreparedView
 
 _SAME = 0.12
 """Two bases nearer to each other than this share of their distance are those of one thing: far away, a small error in
 the picture is a large one on the plane."""
-
-
-def around_bases(observation: Observation, radius: float) -> PreparedView:
-    """The same points, where circles on the plane with this radius [m] are sought: one around each base."""
-    return observation.view._replace(shape=Circle(radius))
-
-
-def sought_bases(observation: Observation, class_name: str, look: Look | None) -> Sought:
-    """The bases of uprights of a class that the network has peaks for. look: the look network for the class, if any."""
-    radius = observation.manifest.radius if look is None else look.contract.upright_radius
-    view = around_bases(observation, radius)
-    return Sought(view, observation.peaks[class_name].apart(view), look)
 
 
 def uprights_at(class_name: str, view: PreparedView, judged: Sequence[Judgment]) -> tuple[Upright, ...]:

@@ -6,9 +6,9 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from ..detection.at_peaks import judge_classes
 from ..detection.detections import Detections
 from ..detection.detector import Detector
+from ..detection.looking import judge_classes
 from ..detection.objects import locate
 from ..detection.settings import Settings
 from ..detection.stopwatch import Stopwatch

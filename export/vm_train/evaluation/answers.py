@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from vm_embedded.arrays import Chosen, Floats, Mask, Singles
-from vm_embedded.detection.at_peaks import judge_classes
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
+from vm_embedded.detection.looking import judge_classes
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Classifier, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView

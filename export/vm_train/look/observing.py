@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from vm_embedded.detection.looking import around_bases
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.peaks import Peaks
-from vm_embedded.detection.upright_bases import around_bases
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import UPRIGHTS
 from vm_embedded.network.manifest import Manifest

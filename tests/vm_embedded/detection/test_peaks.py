@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from tests.looks import look_contract
 from tests.manifests import ball_manifest
 from vm_embedded.arrays import frozen
-from vm_embedded.detection.at_peaks import judge_classes
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.field_points import locate_features
+from vm_embedded.detection.looking import judge_classes
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation, observe
 from vm_embedded.detection.prepared_view import PreparedView

@@ -10,8 +10,8 @@ import pytest
 from tests.vm_train.commands import run, run_module
 from tests.vm_train.fields import CLASSES, STANDING, picture, write_pictures
 from vm_embedded import Detector, read_lens_file
+from vm_embedded.detection.looking import around_bases
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.upright_bases import around_bases
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_export.look_checkpoint import LookCheckpoint
