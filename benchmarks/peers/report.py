@@ -19,7 +19,7 @@ from ..report import DOCS, EXPERIMENTS, fill, machine, ms, number, table
 from . import score, train
 from .boxes import LENSES
 from .detector import TRAINED
-from .times import RESULTS, TWO_STAGE
+from .times import RESULTS, TODAY, TWO_STAGE
 
 PAGE = EXPERIMENTS / "other-detectors.md"
 
@@ -50,6 +50,21 @@ def times(found: dict[str, Any]) -> str:
         rows.append([name, f"{row['operations'] / 1e9:.3g}", *theirs[:2], *ours, theirs[2]])
     heads = ["detector", "GFLOP", "paper", "relative", "here", "p99", "first call", "relative", "paper / here"]
     return table(heads, rows)
+
+
+def on_frames(found: dict[str, Any]) -> str:
+    """Times on all frames, also as shares of those of the last detector of TODAY."""
+    rows = []
+    for instructions, sets in found["all frames"].items():
+        for name, row in sets[next(iter(sets))].items():
+            cells = []
+            for calls in sets.values():
+                share = calls[name]["p50"] / calls[TODAY[-1]]["p50"]
+                cells += [ms(calls[name]["p50"]), ms(calls[name]["p99"]), f"{share:.2f}"]
+                cells.append(ms(calls[name]["noise"]) if "noise" in row else "-")
+            rows.append([instructions, name, *cells])
+    heads = [f"{each}: {head}" for each in sets for head in ("median", "p99", f"of {TODAY[-1]}", "noise")]
+    return table(["instructions of ONNX Runtime", "detector", *heads], rows)
 
 
 def _times(factor: float) -> str:
@@ -191,7 +206,12 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
 Tables = dict[str, Callable[[dict[str, Any]], str]]
 """Functions that make tables from results, by the marks of the page."""
 
-TABLES: Tables = {"machine of the times": machine, "paper's table": times, "per proposal": proposals}
+TABLES: Tables = {
+    "machine of the times": machine,
+    "paper's table": times,
+    "all frames": on_frames,
+    "per proposal": proposals,
+}
 """The tables from peer_times.json."""
 
 TRAININGS: Tables = {"peers' trainings": trainings}

@@ -1,7 +1,9 @@
 """Times of the paper's tab:visualmesh_performance, and per proposal: `python -m benchmarks.peers.times`.
 
 Whole calls, from frame to boxes, on one pinned core and in turns. The random weights of the other networks do not
-change their times. Writes benchmarks/peer_times.json. --quick makes fewer rounds, for a check that it works.
+change their times. The networks of the package and those that teams use today also run on all reference frames and all
+frames of ../shared/real, with ONNX Runtime as it is and restricted to AVX2 (see instruction_sets.py).
+Writes benchmarks/peer_times.json. --quick makes fewer rounds, for a check that it works.
 """
 
 from __future__ import annotations
@@ -9,11 +11,14 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import cv2
@@ -29,7 +34,8 @@ from vm_embedded.network.model_file import read_model
 from vm_export.look_network import LookNetwork, LookShape
 from vm_export.look_weights import looks_of
 
-from ..frames import Frame, frames
+from ..frames import Frame, frame_folder, frames, read_frames
+from ..instruction_sets import SETS, copy_runtime
 from ..networks import NETWORKS, checkpoint, model_file
 from ..timing import interleaved, summary
 from .networks import PEERS, Peer, PeerDetector, loaded
@@ -56,6 +62,9 @@ ORDER = (
     *("SSDLite MobileNet v3, 320", "YOLO nano, 320", "YOLO nano, 640"),
 )
 """The paper's rows in its order, and ours; then what teams use today."""
+
+TODAY = ("SSDLite MobileNet v3, 320", "YOLO nano, 320")
+"""Detectors that teams use today, and the times of ours as shares of the last one."""
 
 _SLOW = {"YOLO v1, 448", "YOLO v2, 416", "YOLO v3, 416", TWO_STAGE}
 _ROW, _SLOW_ROW = 30, 3
@@ -148,6 +157,51 @@ def whole_calls(frame: Frame, folder: Path, rounds: int) -> dict[str, Any]:
     return {name: {**times[name], "calls": rounds * (rows[name] - 1), **work[name]} for name in ORDER}
 
 
+def on_all_frames(rounds: int) -> dict[str, Any]:
+    """Times of whole calls on all frames of each set, by detector [ms], and on a frame of noise.
+
+    Each detector in turn runs over all frames, as on a robot; the first frame after another detector does not count.
+    """
+    found: dict[str, Any] = {}
+    for name, folder in (("reference", frame_folder("reference/images")), ("real", frame_folder("real/images"))):
+        if folder is None:
+            continue
+        work = read_frames(folder)
+        detectors = {each: Detector.from_file(each) for each in PACKAGED}
+        calls: dict[str, list[Callable[[], object]]] = {
+            each: [own_call(detector, frame) for frame in work] for each, detector in detectors.items()
+        }
+        for peer in PEERS:
+            if peer.name in TODAY:
+                calls[peer.name] = [partial(PeerDetector(peer).detect, frame.image) for frame in work]
+        times: dict[str, list[float]] = {each: [] for each in calls}
+        for number in range(rounds + 1):
+            for each, its_calls in calls.items():
+                its_calls[-1]()
+                for call in its_calls:
+                    started = perf_counter()
+                    call()
+                    if number:  # the first round fills caches
+                        times[each].append(1e3 * (perf_counter() - started))
+        found[name] = {each: {**summary(np.array(values)), "calls": len(values)} for each, values in times.items()}
+        for each, detector in detectors.items():
+            noise = np.random.default_rng(0).integers(0, 256, work[0].image.shape, dtype=np.uint8)
+            call = own_call(detector, replace(work[0], image=noise))
+            found[name][each]["noise"] = interleaved({"noise": call}, 10)["noise"]["p50"]
+    return found
+
+
+def with_instructions(bits: int, options: Sequence[str]) -> dict[str, Any]:
+    """The times on all frames in a process whose ONNX Runtime knows these instructions only."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy_runtime(Path(folder), bits)
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join([folder, *sys.path])}
+        command = [sys.executable, "-m", "benchmarks.peers.times", "--all-frames", *options]
+        done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True, text=True)
+        found: dict[str, Any] = json.loads(done.stdout)
+        return found
+
+
 def classifier_call(classifier: PatchClassifier, count: int) -> Callable[[], object]:
     """A call of a classifier with this number of patches, with prepared inputs."""
     torch.manual_seed(0)
@@ -206,6 +260,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--output", type=Path, default=RESULTS)
+    parser.add_argument("--all-frames", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if not options.output.parent.is_dir():
         parser.error(f"there is no folder {options.output.parent}")
@@ -213,6 +268,10 @@ def main() -> None:
     os.sched_setaffinity(0, {max(cores)})
     cv2.setNumThreads(1)
     torch.set_num_threads(1)
+    rounds = 2 if options.quick else 20
+    if options.all_frames:
+        print(json.dumps(on_all_frames(rounds)))
+        return
     what, work = frames()
     frame = middle_frame(work)
     found: dict[str, Any] = {
@@ -225,6 +284,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         found["proposals"] = proposals(frame, 5 if options.quick else 40)
         found["calls"] = whole_calls(frame, Path(folder), 2 if options.quick else 10)
+    quick = ["--quick"] if options.quick else []
+    found["all frames"] = {name: with_instructions(SETS[name], quick) for name in ("AVX2", "this processor")}
     options.output.write_text(json.dumps(found, indent=1) + "\n")
 
 
