@@ -24,7 +24,8 @@ class LookShape:
     """The layers of a look network.
 
     size: samples along each side of a patch, 8 to 128.
-    channels: of the convolutions at a half, a quarter and an eighth of the patch's resolution.
+    channels: of the convolutions at a half, a quarter and an eighth of the patch's resolution. At a quarter, there is
+        one more, a separable one.
     hidden: units of the layer before the answers; 0 means as many as the last convolution has channels.
 
     Raises InputError for values out of range.

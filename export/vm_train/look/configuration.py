@@ -60,7 +60,7 @@ class PatchSettings:
         10, "largest number of peaks that it judges in a picture, here and on the robot", "", (1, 128)
     )
     jittered: int = number(6, "patches beside true objects in a training picture with objects", "", (0, 1000))
-    jitter: float = number(0.6, "largest distance of these from the true center", "apparent radii", (0.0, 1.0))
+    jitter: float = number(0.9, "largest distance of these from the true center", "apparent radii", (0.0, 1.0))
     size_jitter: float = number(
         0.2,
         "natural logarithm of the largest factor by which these are cut too large or too small; the network learns "

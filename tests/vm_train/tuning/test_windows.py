@@ -68,7 +68,7 @@ def test_more_windows_than_opencv_takes_at_once():
 
 def test_labels_follow_the_rules_of_places_on_the_plane():
     ball = windows((100.0, 80.0, 10.0))
-    found = windows((103, 76, 10), (108, 80, 10), (100, 80, 14.5), (100, 80, 20), (120, 80, 10)).label(ball)
+    found = windows((103, 76, 10), (111, 80, 10), (100, 80, 14.5), (100, 80, 20), (120, 80, 10)).label(ball)
     assert found.labels.tolist() == [OBJECT, UNLABELED, UNLABELED, NOTHING, NOTHING]
     np.testing.assert_allclose(found.targets[0], [-0.3, 0.4, 0.0], atol=1e-6)
     assert windows((1, 2, 3)).label(Windows.none()).labels.tolist() == [NOTHING]
@@ -81,7 +81,7 @@ def test_jittered_windows_always_show_their_object(x, y, radius, count, seed):
     assert len(made) == 2 * count
     labels = made.label(objects)
     sizes = np.exp(0.28)
-    near = np.hypot(labels.targets[:, 0], labels.targets[:, 1]) <= 0.6 * sizes + 1e-6
+    near = np.hypot(labels.targets[:, 0], labels.targets[:, 1]) <= 0.9 * sizes + 1e-6
     assert near[labels.labels == OBJECT].all()
     assert (labels.labels != NOTHING).all()
 
