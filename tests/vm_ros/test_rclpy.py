@@ -161,7 +161,7 @@ def pictures(tmp_path_factory):
             cv2.imwrite(str(folder / f"image{name}.jpg"), drawn)
             (folder / f"lens{name}.yaml").write_text(format_lens_file(lens, file.orientation))
             found.append(((folder / f"image{name}.jpg").read_bytes(), lens, file.orientation))
-    return list(zip(found, lines(run(folder, "--model", "soccer", "--max-distance", "6")), strict=True))
+    return list(zip(found, lines(run(folder, "--model", "soccer", "--max-distance", "3")), strict=True))
 
 
 def launched(**arguments):
@@ -179,7 +179,7 @@ def test_pictures_of_another_process_give_the_numbers_of_vm_detect(tmp_path, typ
     """As launched, with parameters and remapping, at 30 pictures a second; then the camera vanishes, and Ctrl-C."""
     topics = {("/seen" if name == "markers" else f"/vm_ros/{name}"): kind for name, kind in ALL.items()}
     peer = peer_of(types, {**topics, "/diagnostics": "DiagnosticArray"})
-    more = f"--status-socket {tmp_path}/control --output-stdout --max-distance 6 --pose-frame optical"
+    more = f"--status-socket {tmp_path}/control --output-stdout --max-distance 3 --pose-frame optical"
     command = launched(image=PICTURE, model="soccer", pose=source, more=f"{more} --ros-middleware rclpy")
     # A busy machine answers, too, only later.
     for name, value in (("camera_lost_ms", 8000), ("pose_wait_ms", 1000), ("camera_max_age_ms", 10000)):
