@@ -185,6 +185,8 @@ def configuration_files(configuration: Path | None, model: str | None) -> dict[s
         )
         return {CONFIGURATION: to_commented_toml(shown).encode(), MODEL: _model(model or DEFAULT)}
     given = read_configuration(configuration)
+    if not given.camera.source:
+        print(f"make bundle: {configuration} names no camera; the robot needs [camera] source", file=sys.stderr)
     text = configuration.read_text(encoding="utf-8-sig")
     table = tomllib.loads(text)
     files = {MODEL: _model(model or given.model)}

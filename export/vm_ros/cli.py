@@ -35,9 +35,9 @@ def parser() -> argparse.ArgumentParser:
     """The command line of vm-ros; its settings are those of a live camera of vm-detect."""
     parser = Parser(
         prog="vm-ros",
-        description="Run the detector as a node of ROS 2: find objects in the images of a topic, and publish them as "
-        "vision_msgs, and the state as diagnostics. Lines on standard output need --output-stdout. It uses rclpy where "
-        "ROS is sourced, and the package cyclonedds elsewhere.",
+        description="Run the detector as a node of ROS 2: publish what the images of a topic show as vision_msgs and "
+        "soccer_vision messages, and the state as diagnostics. Lines on standard output need --output-stdout. It uses "
+        "rclpy where ROS is sourced, and the package cyclonedds elsewhere.",
         epilog="Exit status: as that of vm-detect for a live camera. Where ROS is sourced, the options behind "
         f"{ROS_ARGUMENTS} are those of ROS, such as -r for remapping. " + ANGLES,
     )

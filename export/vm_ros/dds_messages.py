@@ -12,6 +12,8 @@ from cyclonedds.idl import types as idl
 
 from vm_embedded.cameras.ros.message_fields import FIELDS, fields_of, short_name
 
+from .cdr import encode
+
 _PRIMITIVES: dict[str, Any] = {
     "bool": bool,
     "byte": idl.uint8,
@@ -47,13 +49,12 @@ def _message_class(full: str, dds_name: str, classes: dict[str, Any]) -> Any:
     name = full.rpartition("/")[2]
     types = {field: _type(kind, classes) for kind, field in fields_of(full)}
     made: Any = make_idl_struct(name, dds_name, types)
+    made.serialize = lambda self, *_, **__: encode(short_name(full), self)
     octets = [field for kind, field in fields_of(full) if kind == "uint8[]"]
     if octets:
         # cyclonedds reads octets as a list of numbers, which takes a hundred times as long as bytes. But it can't
-        # describe bytes to other participants, so that only the coding is that of a class with bytes.
-        fast = make_idl_struct(name, dds_name, {**types, **dict.fromkeys(octets, bytes)})
-        made.serialize = lambda self, *given, **more: fast(**vars(self)).serialize(*given, **more)
-        made.deserialize = fast.deserialize
+        # describe bytes to other participants, so that only the decoding is that of a class with bytes.
+        made.deserialize = make_idl_struct(name, dds_name, {**types, **dict.fromkeys(octets, bytes)}).deserialize
     return made
 
 

@@ -97,7 +97,10 @@ class DdsMiddleware:
 
     def _receive(self) -> None:
         while not self._closing.is_set():
-            self._waiting.wait(duration(seconds=_TICK))
+            if self._readers:
+                self._waiting.wait(duration(seconds=_TICK))
+            else:  # a wait set without conditions returns at once
+                self._closing.wait(_TICK)
             for reader, take in self._readers:
                 for message in _valid(reader):
                     take(message)

@@ -28,21 +28,24 @@ _PORTS, _FIRST_PORT, _SPARE = 250, 7400, 249
 """Ports of a domain, the first port of domain 0, and one in each domain that DDS does not use."""
 
 
+_CLAIMS = []
+
+
 @contextmanager
 def own_domain(monkeypatch):
-    """A domain of DDS that no other test uses at the same time, in the environment."""
+    """A domain of DDS that no other test uses, in the environment. A participant may outlive its test."""
     for domain in range(1, 200):
         claim = socket.socket()
         with suppress(OSError):
             claim.bind(("127.0.0.1", _FIRST_PORT + _PORTS * domain + _SPARE))
+            _CLAIMS.append(claim)
             break
         claim.close()
     else:
         raise AssertionError("no domain is free")
     monkeypatch.setenv("CYCLONEDDS_URI", URI)
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
-    with claim:
-        yield
+    yield
 
 
 class Peer:
@@ -79,9 +82,10 @@ class Peer:
 
 
 @contextmanager
-def running(tmp_path, *options):
-    """A vm-ros that ends with the block, whatever happens in it."""
+def running(tmp_path, *options, command=None):
+    """A vm-ros that ends with the block, whatever happens in it. command: instead of that with `options`."""
     words = [COMMAND, "--status-socket", tmp_path / "control", "--max-distance", "6", "--output-stdout", *options]
+    words = command or words
     process = subprocess.Popen(
         list(map(str, words)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=dict(os.environ)
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from vm_embedded.cameras.ros.message_fields import MESSAGES
 from vm_embedded.cameras.ros.settings import DRAWN
 from vm_embedded.output.ros.topics import TOPICS
 
@@ -40,5 +41,7 @@ def test_the_example_prints_where_the_ball_is_and_the_state(tmp_path, monkeypatc
 
 def test_the_page_names_all_topics_and_messages():
     named = {**{name: kind for name, (kind, _) in TOPICS.items()}, **dict.fromkeys(DRAWN, "CompressedImage")}
+    assert "`_in_image`" in PAGE
     for topic, message in {**named, "/diagnostics": "DiagnosticArray"}.items():
-        assert re.search(rf"^\| .*`(/vm_ros/)?{topic}`.* \| `\w+/{message}` \|", PAGE, re.MULTILINE), topic
+        single, name = topic.removesuffix("_in_image"), MESSAGES[message].split("/")[2]
+        assert re.search(rf"^\| .*`(/vm_ros/)?{single}`.* \| `\w+/{name}` \|", PAGE, re.MULTILINE), topic

@@ -105,7 +105,7 @@ def parser() -> argparse.ArgumentParser:
     output.add_argument(
         "--save-overlay", type=Path, metavar="DIR", help="write each image as NAME.jpg with its detections drawn in"
     )
-    output.add_argument(
+    overhead = output.add_argument(
         "--save-map", type=Path, metavar="DIR", help="write NAME-map.png: what each image shows, from above"
     )
     output.add_argument(
@@ -133,8 +133,8 @@ def parser() -> argparse.ArgumentParser:
     )
     emit = output.add_argument("--emit-points", metavar="CLASS,...", help="add the points of these classes to the JSON")
     output.add_argument("--explain", action="store_true", help="add rejected proposals or clusters, with reasons")
-    parser.hide(points)
-    parser.hide(emit)
+    for rare in (overhead, points, emit):
+        parser.hide(rare)
     add_settings(parser)
     add_track(parser)
     add_live(parser)

@@ -13,6 +13,7 @@ from vm_embedded.cli.program import Parser
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import SHIPPED, model_path
+from vm_embedded.output.box_files import read_object_file
 
 from ..boxes.findings import finding_lines
 from ..tuning.configuration import TuningConfiguration
@@ -144,4 +145,6 @@ def _report(training: Tuning) -> None:
         names = "".join(f" {old}={new}" for old, new in run.boxes.names.items())
         frames = f"{run.boxes.folder}{names and ' --names' + names} --list {run.split_path}"
         print(f"next: vm-evaluate --boxes {frames} {run.model} {model} -o evaluation")
-    print(f"next: vm-detect --model {model} {_frames_to_try(run)} --save-overlay found")
+    shape = read_object_file(run.boxes.folder)
+    size = "" if shape is None else f" --object-radius {shape.radius:g}"
+    print(f"next: vm-detect --model {model} {_frames_to_try(run)}{size} --save-overlay found")

@@ -77,16 +77,51 @@ def test_rays_of_crossings_are_their_lines(frame):
         assert abs(middle.real - expected) < 1e-9
 
 
+def test_the_same_features_are_in_the_image(frame):
+    found, made = frame
+    field, view = found.field, found.observation.view
+
+    def pixels(points):
+        return np.array([[each.x, each.y] for each in points])
+
+    assert np.allclose(pixels(each.center for each in made["balls_in_image"].balls), [each.center for each in found])
+    for name, things in (("goalposts", field.posts), ("robots", field.robots)):
+        array = made[f"{name}_in_image"]
+        messages = array.posts if name == "goalposts" else array.robots
+        assert np.allclose(pixels(each.bb.center.position for each in messages), [each.pixel for each in things])
+        for each, thing in zip(messages, things, strict=True):
+            toward = thing.position / np.linalg.norm(thing.position)
+            sides = thing.position + 0.5 * thing.width * np.array([(-toward[1], toward[0]), (toward[1], -toward[0])])
+            assert math.isclose(each.bb.size_x, np.linalg.norm(np.diff(view.plane_pixels(sides), axis=0)))
+    assert [each.attributes.side for each in made["goalposts_in_image"].posts] == [1, 2]
+    marks = made["markings_in_image"]
+    ends = [[[each.start.x, each.start.y], [each.end.x, each.end.y]] for each in marks.segments]
+    assert np.allclose(ends, [each.pixels for each in field.lines])
+    (circle,), (center,) = marks.ellipses, view.plane_pixels(field.circle.center[None])
+    assert np.allclose([circle.center.x, circle.center.y], center)
+    assert circle.bb.size_x > circle.bb.size_y > 0.0
+    for each, message in zip(field.crossings, marks.intersections, strict=True):
+        assert np.allclose(pixels([message.center]), view.plane_pixels(each.position[None]))
+        assert message.num_rays == len(message.heading_rays) == {"L": 2, "T": 3, "X": 4}[each.kind]
+        assert sorted(message.heading_rays) == list(message.heading_rays)
+        assert 0.0 <= min(message.heading_rays) <= max(message.heading_rays) < math.tau
+    boundary = made["field_boundary_in_image"]
+    assert np.allclose(pixels(boundary.points), field.border.pixels)
+    assert boundary.header.frame_id == marks.header.frame_id == "eye"
+
+
 def test_markers_draw_each_thing_once(frame):
     found, made = frame
     markers, field = made["markers"].markers, found.field
     assert markers[0].action == 3  # all of the frame before go
-    names = [each.ns for each in markers[1:]]
-    expected = ["objects"] * bool(len(found)) + ["posts"] * 2 + ["robots"] * 2 + ["lines", "circle"]
-    assert names == [*expected, *["crossings"] * 3, "border"]
-    assert [each.id for each in markers] == list(range(len(markers)))
-    by_name = dict(zip(names, markers[1:], strict=True))
+    by_name = {each.ns: each for each in markers[1:]}
+    expected = ["objects"] * bool(len(found)) + ["posts", "robots", "lines", "circle", "crossings", "border"]
+    assert [each.ns for each in markers[1:]] == expected
+    assert same(by_name["posts"].points[::2], [each.position for each in field.posts])
+    assert same(by_name["robots"].points, [each.position for each in field.robots])
     assert same(by_name["lines"].points, [each.ends for each in field.lines])
+    starts = [each.position for each in field.crossings for _ in range({"L": 2, "T": 3, "X": 4}[each.kind])]
+    assert same(by_name["crossings"].points[::2], starts)
     assert same(by_name["border"].points, field.border.points)
 
 
@@ -95,4 +130,4 @@ def test_a_network_without_a_field_sends_no_empty_field():
     header = header_of(TYPES, stamp_of(TYPES, 0.0), "")
     results = FrameResults(TYPES, header, header, found, Orientation.from_roll_pitch(0.6, 0.0, 0.3), np.zeros(2))
     sent = {name for name, (_, make) in TOPICS.items() if make(results) is not None}
-    assert sent == {"detections_2d", "detections_3d", "balls", "markers"}
+    assert sent == {"detections_2d", "detections_3d", "balls", "balls_in_image", "markers"}

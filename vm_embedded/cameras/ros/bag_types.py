@@ -47,11 +47,11 @@ def typestore() -> Any:
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     for full in MESSAGES.values():
         if full not in store.types:
-            store.register(typesys.get_types_from_msg(_definition(full), full))
+            store.register(typesys.get_types_from_msg(definition(full), full))
     return store
 
 
-def _definition(full: str) -> str:
+def definition(full: str) -> str:
     """The definition of a message as in its .msg file."""
     lines = []
     for kind, name in fields_of(full):

@@ -54,6 +54,19 @@ FIELDS = {
     "soccer_vision_3d_msgs/msg/MarkingArray": "Header header, MarkingEllipse[] ellipses, "
     "MarkingIntersection[] intersections, MarkingSegment[] segments",
     "soccer_vision_3d_msgs/msg/FieldBoundary": "Header header, Point[] points, Confidence confidence",
+    "soccer_vision_2d_msgs/msg/Ball": "BoundingBox2D bb, Point2D center, Confidence confidence",
+    "soccer_vision_2d_msgs/msg/BallArray": "Header header, Ball2D[] balls",
+    "soccer_vision_2d_msgs/msg/Goalpost": "BoundingBox2D bb, GoalpostAttributes attributes, Confidence confidence",
+    "soccer_vision_2d_msgs/msg/GoalpostArray": "Header header, Goalpost2D[] posts",
+    "soccer_vision_2d_msgs/msg/Robot": "BoundingBox2D bb, RobotAttributes attributes, Confidence confidence",
+    "soccer_vision_2d_msgs/msg/RobotArray": "Header header, Robot2D[] robots",
+    "soccer_vision_2d_msgs/msg/MarkingEllipse": "BoundingBox2D bb, Point2D center, Confidence confidence",
+    "soccer_vision_2d_msgs/msg/MarkingIntersection": "Point2D center, int32 num_rays, float64[] heading_rays, "
+    "Confidence confidence",
+    "soccer_vision_2d_msgs/msg/MarkingSegment": "Point2D start, Point2D end, Confidence confidence",
+    "soccer_vision_2d_msgs/msg/MarkingArray": "Header header, MarkingEllipse2D[] ellipses, "
+    "MarkingIntersection2D[] intersections, MarkingSegment2D[] segments",
+    "soccer_vision_2d_msgs/msg/FieldBoundary": "Header header, Point2D[] points, Confidence confidence",
     "visualization_msgs/msg/UVCoordinate": "float32 u, float32 v",
     "visualization_msgs/msg/MeshFile": "string filename, uint8[] data",
     "visualization_msgs/msg/Marker": "Header header, string ns, int32 id, int32 type, int32 action, Pose pose, "
@@ -85,9 +98,11 @@ _FOXGLOVE_FIELDS = {
 
 
 def short_name(full: str) -> str:
-    """The unique short name of a message: the last part of its full name; that of attributes ends in Attributes."""
+    """The unique short name of a message: its last part, and Attributes or 2D where others have it."""
     package, _, name = full.split("/")
-    return f"{name}Attributes" if package == "soccer_vision_attribute_msgs" and name != "Confidence" else name
+    if package == "soccer_vision_attribute_msgs" and name != "Confidence":
+        return f"{name}Attributes"
+    return f"{name}2D" if package == "soccer_vision_2d_msgs" else name
 
 
 MESSAGES = {short_name(full): full for full in FIELDS | _FOXGLOVE_FIELDS}

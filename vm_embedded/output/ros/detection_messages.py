@@ -36,10 +36,14 @@ class FrameResults:
     orientation: Orientation
     offset: Floats
 
+    def points(self, positions: Floats) -> list[Any]:
+        """geometry_msgs/Point at positions (n, 2) or (n, 3) [m] of Detections."""
+        point, (east, north) = self.types.Point, self.offset.tolist()
+        return [point(x=x + east, y=y + north, z=z[0] if z else 0.0) for x, y, *z in positions.tolist()]
+
     def point(self, position: Floats) -> Any:
         """A geometry_msgs/Point at a position (2,) or (3,) [m] of Detections."""
-        x, y, *z = position.tolist()
-        return self.types.Point(x=x + float(self.offset[0]), y=y + float(self.offset[1]), z=z[0] if z else 0.0)
+        return self.points(position[None])[0]
 
     def pose(self, position: Floats) -> Any:
         """A geometry_msgs/Pose at a position as that of `point`, not rotated."""
@@ -67,23 +71,29 @@ def detection_3d_array(frame: FrameResults) -> Any:
 
 def _detection_2d(frame: FrameResults, detection: Detection) -> Any:
     types = frame.types
-    around = np.array([detection.center - detection.radius, detection.center + detection.radius])
-    points = detection.outline if len(detection.outline) else around
-    low, high = points.min(axis=0), points.max(axis=0)
-    (x, y), (width, height) = 0.5 * (low + high), high - low
     # The bearing leads from the camera to the object, in the plane's frame.
     position = detection.distance * (frame.orientation.rotation @ OPTICAL_TO_CAMERA).T @ detection.bearing
     pose = _pose(types, types.Point(**dict(zip("xyz", position.tolist(), strict=True))))
     return types.Detection2D(
         header=frame.in_image,
         results=[_hypothesis(types, detection, pose)],
-        bbox=types.BoundingBox2D(
-            center=types.Pose2D(position=types.Point2D(x=float(x), y=float(y)), theta=0.0),
-            size_x=float(width),
-            size_y=float(height),
-        ),
+        bbox=object_box(types, detection),
         id=_track_id(detection),
     )
+
+
+def object_box(types: Any, detection: Detection) -> Any:
+    """A BoundingBox2D of the outline of a detection [px]."""
+    around = np.array([detection.center - detection.radius, detection.center + detection.radius])
+    return box_around(types, detection.outline if len(detection.outline) else around)
+
+
+def box_around(types: Any, pixels: Floats) -> Any:
+    """A BoundingBox2D around pixels (n, 2)."""
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    (x, y), (width, height) = (0.5 * (low + high)).tolist(), (high - low).tolist()
+    center = types.Pose2D(position=types.Point2D(x=x, y=y), theta=0.0)
+    return types.BoundingBox2D(center=center, size_x=width, size_y=height)
 
 
 def _detection_3d(frame: FrameResults, detection: Detection) -> Any:
