@@ -120,10 +120,12 @@ def _node_weights(count: int, size: int) -> Singles:
 def cut_patches(pyramid: Pyramid, nodes: Singles, size: int) -> Image:
     """Colors (c, size, size, 3), RGB, of patches with these nodes (2, c, N, N) [px] in the whole frame.
 
-    Each patch is read from the sharpest level of the pyramid with less than two pixels between samples. Outside of the
-    frame it repeats the frame's border.
+    Each patch is read from the sharpest level of the pyramid with less than two pixels between samples, but from the
+    frame itself instead of the frame halved once: to halve all that patches need takes too long. Outside of the frame a
+    patch repeats the frame's border.
     """
     levels = np.floor(np.log2(np.maximum(_spacing(nodes, size), 1.0))).astype(np.intp)
+    levels[levels == 1] = 0
     shrunk = (nodes + np.float32(0.5)) * np.exp2(-levels, dtype=np.float32)[:, None, None] - np.float32(0.5)
     x, y = samples(shrunk, size)
     patches = np.empty((len(levels), size, size, 3), dtype=np.uint8)
