@@ -30,7 +30,8 @@ def sample_strips(pyramid: Pyramid, pixels: Floats, levels: Levels, layout: Canv
         region = piece.region
         if shown[region].any():
             level = int(levels.halvings[piece.point])
+            scale = np.float32(0.5**level)
             # Pixels count from the middle of the first one.
-            x, y = ((each[region] + np.float32(0.5)) * np.float32(0.5**level) - np.float32(0.5) for each in places)
+            x, y = (each[region] * scale + (scale - np.float32(1.0)) * np.float32(0.5) for each in places)
             canvas[region] = pyramid.at(level, x, y, shown[region])
     return canvas
