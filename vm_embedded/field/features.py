@@ -41,12 +41,15 @@ class Segment(Record):
     """A straight piece of a field line: its middle line.
 
     ends (2, 2) [m]: both ends on the plane. pixels (2, 2) [px]: of the ends; NaN outside of the picture. confidence:
-    mean probability of its points, 0 to 1.
+    mean probability of its points, 0 to 1. width [m]: as the picture shows it; NaN if it is too narrow there or hidden.
+    turn_error [rad]: standard deviation of its direction; NaN if the picture does not show its edges.
     """
 
     ends: Annotated[Floats, Sent(3, (2, 2))]
     pixels: Annotated[Floats, Sent(1, (2, 2), null=True)]
     confidence: Annotated[float, SHARE]
+    width: float
+    turn_error: float
 
     @property
     def length(self) -> float:

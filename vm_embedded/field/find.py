@@ -52,7 +52,12 @@ def find_features(
     places = np.concatenate([ends, border, behind.view(np.float64).reshape(-1, 2)])
     pixels = to_pixels(places)  # faster at once
     shown = np.isfinite(pixels[len(ends) + len(border) :, 0]).reshape(-1, 2).tolist()
-    lines = tuple(map(Segment, ends.reshape(-1, 2, 2), pixels[: len(ends)].reshape(-1, 2, 2), confidences))
+    lines = tuple(
+        Segment(its_ends, shown_at, confidence, each.width, each.turn_error)
+        for each, its_ends, shown_at, confidence in zip(
+            pieces, ends.reshape(-1, 2, 2), pixels[: len(ends)].reshape(-1, 2, 2), confidences, strict=True
+        )
+    )
     thinned, likelihoods = _thinned(likely)
     return FieldFeatures(
         posts=posts,

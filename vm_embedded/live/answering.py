@@ -11,6 +11,7 @@ import cv2
 from ..cameras.camera import Shot
 from ..detection.detections import Detections
 from ..detection.detector import Detector
+from ..detection.pose_check import PoseCheck
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens import Lens
@@ -49,10 +50,12 @@ class Answerer:
         self.configuration, self.detector = configuration, detector
         self._poses, self._counters, self._health, self._watchdog = poses, counters, health, watchdog
         self._tracker = Tracker(configuration.track)
+        self.pose_check = PoseCheck()
 
     def reload(self, configuration: Configuration, detector: Detector) -> None:
-        """Use another configuration and its detector from now on. Tracks continue."""
+        """Use another configuration and its detector from now on. Tracks continue; the check of the pose begins anew."""
         self.configuration, self.detector = configuration, detector
+        self.pose_check = PoseCheck()
         self._tracker.settings = configuration.track
 
     async def answer(self, shot: Shot) -> Answer | None:
@@ -64,7 +67,7 @@ class Answerer:
             self._health.pose_trouble = ""
             started = time.perf_counter()
             with self._watchdog.frame():
-                detections = self.detector.detect(shot.image, orientation, lens)
+                detections = self.pose_check.update(self.detector.detect(shot.image, orientation, lens))
             if self.configuration.track.on:
                 detections = self._tracker.update(detections, shot.captured)
         except StalePoseError as error:

@@ -1,0 +1,173 @@
+"""Is the camera's pose right? The clues of many frames together tell.
+
+Each frame whose picture is new adds its evidence (field/pose_evidence.py). Older evidence slowly counts less. The sum
+says how far pitch, roll and height are off, and how sure that is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from ..arrays import Floats, Image
+from ..field.pose_evidence import ERRORS, EXPECTED, HEIGHT, NOTHING, PITCH, BallClues, Clues, Evidence, LineClues, evidence_of, solved
+from .above_horizon import field_above_horizon
+from .detections import Detections
+from .pose_state import PoseState
+from .prepared_view import PreparedView
+
+_KEPT = 1.0 - 1.0 / 300.0
+"""Share of the evidence that a further frame leaves: about that of the last 300 frames counts."""
+
+_WORTH = 0.25
+"""What a frame's evidence counts: its clues have errors in common, and it resembles other frames."""
+
+_KNOWN = np.array([math.radians(1.5), math.radians(1.5), 0.05])
+"""Standard deviations below which errors of pitch, roll and height are known."""
+
+_DOUBTFUL = np.array([math.radians(1.2), math.radians(1.2), 0.06])
+_WRONG = np.array([math.radians(2.0), math.radians(2.0), 0.12])
+"""Errors of pitch, roll and height that a right pose may have, because clues share errors."""
+
+_DOUBT_AT, _WRONG_AT = 2.0, 3.0
+"""Standard deviations by which an error must be larger."""
+
+_SMALLEST = 3.0
+"""Least radius of an object whose size is a clue [px]."""
+
+_FIELD_ABOVE = math.radians(3.5)
+"""Mean angle above the horizon up to which pictures look like the field, from which the pose is doubtful."""
+
+_FEWEST_ABOVE = 3
+"""Pictures that are needed for this."""
+
+_THUMBNAIL = (20, 16)
+_CHANGED = 0.12
+"""Mean change of a thumbnail from which a picture is new, as a share of its contrast."""
+
+
+class PoseCheck:
+    """Collects evidence about the pose of a camera.
+
+        check = PoseCheck()
+        for image in frames:
+            detections = check.update(detector.detect(image, orientation, lens))
+            print(detections.pose.verdict)
+
+    A robot's poses change; the check finds what they have in common: errors of the mount, the joints or the lens.
+    """
+
+    def __init__(self) -> None:
+        self.evidence = NOTHING
+        self._frames = 0.0
+        self._above = self._looked = 0.0  # sum of angles of field above the horizon [rad], and pictures looked at
+        self._thumbnail: Image | None = None
+        self.errors: Floats = np.zeros(ERRORS)
+        self.deviations: Floats = EXPECTED
+        self._state = PoseState(verdict="unknown")
+
+    def update(self, detections: Detections) -> Detections:
+        """The same detections with what they and those before say about the pose."""
+        if not detections.manifest.peaks:  # its sizes are as coarse as its mesh
+            return detections
+        if self._is_new(detections):
+            if self.deviations[PITCH] > _KNOWN[PITCH]:
+                self._look_above(detections)
+            self.add(evidence_of(clues_of(detections), self.errors))
+        return replace(detections, pose=self._state)
+
+    def _look_above(self, detections: Detections) -> None:
+        names = [each.name for each in detections.manifest.classes]
+        angle = field_above_horizon(detections.observation, names.index("field")) if "field" in names else None
+        if angle is not None:
+            self._above, self._looked = self._above * _KEPT + angle, self._looked * _KEPT + 1.0
+
+    def add(self, found: Evidence) -> None:
+        """Add the evidence of a frame."""
+        self.evidence = self.evidence.scaled(_KEPT, 1.0) + found.scaled(1.0, _WORTH)
+        self._frames = self._frames * _KEPT + 1.0
+        self.errors, self.deviations = solved(self.evidence)
+        self._state = self._judged()
+
+    @property
+    def field_above(self) -> float:
+        """The angle above the horizon up to which pictures look like the field [rad]; 0 if it is small."""
+        mean = self._above / max(self._looked, 1.0)
+        return mean if self._looked >= _FEWEST_ABOVE - 0.5 and mean > _FIELD_ABOVE else 0.0
+
+    @property
+    def state(self) -> PoseState:
+        """What the frames so far say."""
+        return self._state
+
+    def _judged(self) -> PoseState:
+        errors, deviations = self.errors[:3], self.deviations[:3]
+        sizes = np.abs(errors)
+        known = deviations < _KNOWN
+        if (sizes - _WRONG_AT * deviations > _WRONG).any():
+            verdict = "wrong"
+        elif (sizes - _DOUBT_AT * deviations > _DOUBTFUL).any() or (not known[PITCH] and self.field_above):
+            verdict = "doubtful"
+        else:
+            verdict = "consistent" if known[:HEIGHT].all() else "unknown"
+        pitch, roll, height = (
+            float(value) if is_known or abs(value) > _WRONG_AT * deviation else None
+            for value, is_known, deviation in zip(errors, known, deviations, strict=True)
+        )
+        return PoseState(
+            verdict=verdict,
+            pitch=None if pitch is None else math.degrees(pitch),
+            roll=None if roll is None else math.degrees(roll),
+            height=None if height is None else 100.0 * math.expm1(height),
+            frames=round(self._frames),
+            balls=round(self.evidence.balls),
+            lines=round(self.evidence.lines),
+        )
+
+    def _is_new(self, detections: Detections) -> bool:
+        """Whether a picture differs from the last one that counted: a camera that stands still learns nothing more."""
+        picture = detections.observation.pyramid.level(2)
+        thumbnail = cv2.resize(picture, _THUMBNAIL, interpolation=cv2.INTER_AREA)
+        last = self._thumbnail
+        if last is not None and last.shape == thumbnail.shape:
+            contrast = 2.0 + cv2.meanStdDev(thumbnail)[1].mean()
+            if cv2.norm(thumbnail, last, cv2.NORM_L1) < _CHANGED * contrast * thumbnail.size:
+                return False
+        self._thumbnail = thumbnail
+        return True
+
+
+def clues_of(detections: Detections) -> Clues:
+    """What a frame shows that tells about the pose."""
+    view = detections.observation.view
+    back = _to_level(view)
+    segments = () if detections.field is None else detections.field.lines
+    lines = LineClues(
+        np.array([each.ends for each in segments]).reshape(-1, 2, 2) @ back.T,
+        np.array([each.turn_error for each in segments]),
+        np.array([each.width for each in segments]),
+    )
+    large = [each for each in detections if each.radius > _SMALLEST]
+    bearings = np.array([each.bearing for each in large]).reshape(-1, 3)
+    bearings[:, :2] = bearings[:, :2] @ back.T
+    balls = BallClues(
+        bearings,
+        np.array([each.distance / each.distance_by_angle for each in large]),
+        np.array([each.radius for each in large]),
+        np.array([each.confidence for each in large]),
+        view.height / (view.height - view.shape.center_height),
+        1.0 / view.lens.scale,
+    )
+    return Clues(lines, balls, view.height)
+
+
+def _to_level(view: PreparedView) -> Floats:
+    """The rotation (2, 2) from the plane's frame to the one whose x axis is ahead of the camera."""
+    ahead = view.heading @ view.rotation[:, 0]
+    if math.hypot(ahead[0], ahead[1]) < 1e-9:  # it looks straight down: ahead is the picture's upward direction
+        ahead = -(view.heading @ view.rotation[:, 2]) * ahead[2]
+    x, y = ahead[:2] / math.hypot(ahead[0], ahead[1])
+    return np.array([[x, y], [-y, x]])

@@ -1,0 +1,28 @@
+"""What frames say about the camera's pose, as messages have it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from ..borders.records import SIZE, Record, Sent
+
+VERDICTS = ("unknown", "consistent", "doubtful", "wrong")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseState(Record):
+    """What the frames so far say about the camera's pose.
+
+    verdict: wrong, doubtful or consistent; unknown if the frames show too little. pitch, roll [deg]: true minus assumed
+    one, as estimated; null if unknown. height [%]: how much larger the true one is; null if unknown. frames: number of
+    different pictures. balls, lines: number of clues that it rests on.
+    """
+
+    verdict: Annotated[str, Sent(allowed=VERDICTS)]
+    pitch: Annotated[float | None, Sent(1, null=True)] = None
+    roll: Annotated[float | None, Sent(1, null=True)] = None
+    height: Annotated[float | None, Sent(0, null=True)] = None
+    frames: Annotated[int, SIZE] = 0
+    balls: Annotated[int, SIZE] = 0
+    lines: Annotated[int, SIZE] = 0
