@@ -11,7 +11,7 @@ from ..detection.pose_search import View, with_search
 from ..geometry.lens import Lens
 from ..geometry.lens_doubt import lens_doubt
 from ..geometry.orientation import Orientation
-from .pose_remark import pose_remark
+from ..live.pose_remark import pose_remark
 from .size_hint import size_hint, size_ratios
 
 _SEVERAL = 5

@@ -25,7 +25,6 @@ from ..network.model_file import ModelFile, parse_model
 from .closing_remarks import ClosingRemarks
 from .finding import BAD, GOOD, WARNING, Finding
 
-
 _VIEWS = 2
 """Frames in which a better pose is sought: the time of the process is limited."""
 

@@ -75,4 +75,4 @@ def _colors(picture: Image, pixels: Floats) -> Floats:
     x, y = (pixels / 2**_LEVEL).astype(np.intp).T
     height, width = picture.shape[:2]
     found = picture[np.minimum(y, height - 1), np.minimum(x, width - 1)]
-    return found.reshape(len(x), -1).astype(np.float64)
+    return np.asarray(found.reshape(len(x), -1), dtype=np.float64)

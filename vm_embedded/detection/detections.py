@@ -106,7 +106,7 @@ class Detections:
         return f"<{len(self.objects)} detections, {len(self.pixels)} points: {list(self.objects)}>"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, pose, timing_ms [ms].
+        """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, pose, timing_ms.
 
         Without field features, the key `field` is missing.
         """

@@ -13,7 +13,19 @@ import cv2
 import numpy as np
 
 from ..arrays import Floats, Image
-from ..field.pose_evidence import ERRORS, EXPECTED, HEIGHT, NOTHING, PITCH, BallClues, Clues, Evidence, LineClues, evidence_of, solved
+from ..field.pose_evidence import (
+    ERRORS,
+    EXPECTED,
+    HEIGHT,
+    NOTHING,
+    PITCH,
+    BallClues,
+    Clues,
+    Evidence,
+    LineClues,
+    evidence_of,
+    solved,
+)
 from .above_horizon import field_above_horizon
 from .detections import Detections
 from .pose_state import PoseState
@@ -28,8 +40,8 @@ _WORTH = 0.25
 _KNOWN = np.array([math.radians(1.5), math.radians(1.5), 0.05])
 """Standard deviations below which errors of pitch, roll and height are known."""
 
-_DOUBTFUL = np.array([math.radians(1.2), math.radians(1.2), 0.06])
-_WRONG = np.array([math.radians(2.0), math.radians(2.0), 0.12])
+_DOUBTFUL = np.array([math.radians(1.8), math.radians(1.8), 0.06])
+_WRONG = np.array([math.radians(2.5), math.radians(2.5), 0.12])
 """Errors of pitch, roll and height that a right pose may have, because clues share errors."""
 
 _DOUBT_AT, _WRONG_AT = 2.0, 3.0
@@ -130,7 +142,7 @@ class PoseCheck:
     def _is_new(self, detections: Detections) -> bool:
         """Whether a picture differs from the last one that counted: a camera that stands still learns nothing more."""
         picture = detections.observation.pyramid.level(2)
-        thumbnail = cv2.resize(picture, _THUMBNAIL, interpolation=cv2.INTER_AREA)
+        thumbnail = np.asarray(cv2.resize(picture, _THUMBNAIL, interpolation=cv2.INTER_AREA), dtype=np.uint8)
         last = self._thumbnail
         if last is not None and last.shape == thumbnail.shape:
             contrast = 2.0 + cv2.meanStdDev(thumbnail)[1].mean()

@@ -1,31 +1,32 @@
 """Search for the pose with which frames look like a field.
 
-Evidence (field/pose_evidence.py) is linear: it holds for small errors only. So the search detects again with each better
-pose, as in Gauss and Newton's method, and from several pitches and heights. The pose counts with which the clues agree
-best.
+Evidence (field/pose_evidence.py) is linear: it holds for small errors only. So the search detects again with each
+better pose, as in the method of Gauss and Newton, and from several pitches and heights. The pose counts with which the
+clues agree best.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import AnyImage, Floats
-from ..errors import GeometryError
-from ..field.pose_evidence import ERRORS, EXPECTED, HEIGHT, NOTHING, WIDTH, evidence_of, of_balls, solved
+from ..errors import GeometryError, InputError
+from ..field.pose_evidence import ERRORS, EXPECTED, HEIGHT, LINE_WIDTH, NOTHING, WIDTH, evidence_of, of_balls, solved
 from ..geometry.lens import Lens
 from ..geometry.orientation import Orientation
 from .detector import Detector
 from .pose_check import clues_of
 from .pose_state import PoseState
 
-_PITCHES = np.radians([0.0, 8.0, -8.0, 17.0, -17.0, 28.0]).tolist()
+PITCHES = np.radians([0.0, 8.0, -8.0, 17.0, -17.0, 28.0]).tolist()
 """Errors of the pitch that are tried."""
 
-_HEIGHTS = np.log([1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8]).tolist()
+HEIGHTS = np.log([1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8]).tolist()
 """Errors of the height that are tried."""
 
 _FEW_HEIGHTS = np.log([1.0, 0.5, 2.0]).tolist()
@@ -58,14 +59,17 @@ _LEAST = 4.0
 _BETTER, _SURE = 1.15, 4.0
 """A better pose has a gain that is larger by this factor and this number."""
 
-_SURE_BALLS = 2.5
+SURE_BALLS = 2.0
 """Gain of balls from which they tell the height."""
 
-_OFF, _OFF_HEIGHT = math.radians(2.0), 0.12
+_OFF, _OFF_HEIGHT = math.radians(2.5), 0.12
 """Least errors of a pose that is wrong."""
 
 _SCALED = 0.15
 """Standard deviation of the height from which it is not known at all: then only balls of other heights tell."""
+
+_KNOWN_WIDTH = 0.05
+"""Standard deviation of the logarithm of a known width of lines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +98,18 @@ class Tried:
     balls: int
     lines: int
 
+    @property
+    def rank(self) -> float:
+        """How good a correction is: clues that agree count, balls of the right size count more, and errors that the
+        clues still see count against it."""
+        left = float(np.abs(self.step[:HEIGHT]).max())
+        return self.gain + _BALLS_COUNT * self.ball_gain - _LEFT_COUNTS * math.log1p(left / math.radians(1.0))
+
+    @property
+    def total(self) -> Floats:
+        """The correction (ERRORS,) with the step."""
+        return self.errors + np.clip(self.step, -_LARGEST, _LARGEST)
+
 
 def corrected(orientation: Orientation, errors: Floats) -> Orientation:
     """The orientation without these errors (ERRORS,)."""
@@ -103,36 +119,72 @@ def corrected(orientation: Orientation, errors: Floats) -> Orientation:
     )
 
 
-def search(detector: Detector, views: Sequence[View], angles_known: bool = False) -> tuple[Tried, Tried]:
-    """The poses as they are, and without their errors, found from far away.
+class PoseSearch:
+    """Frames, and a detector that looks at them with corrected poses. line_width [m]: of the lines, if it is known."""
 
-    angles_known: pitch and roll are right, or nearly.
-    """
-    given = look(detector, views, np.zeros(ERRORS))
-    some = views[:: -(-len(views) // _SOME_VIEWS)]
-    pitches = [0.0] if angles_known else _PITCHES
-    starts = [
-        look(detector, some, np.array([pitch, 0.0, height, 0.0]))
-        for height in (_HEIGHTS if angles_known else _FEW_HEIGHTS)
-        for pitch in pitches
-    ]
-    best = given
-    for each in sorted(starts, key=rank, reverse=True)[:_REFINED]:
-        if each.gain > _LEAST:
-            best = max(best, refined(detector, views, each), key=rank)
-    if best is given:
-        return given, given
-    heights = [look(detector, views, best.errors + [0.0, 0.0, each, 0.0]) for each in _HEIGHTS if each]
-    return given, refined(detector, views, max([best, *heights], key=rank))
+    def __init__(self, detector: Detector, views: Sequence[View], line_width: float | None = None) -> None:
+        self._detector, self._views = detector, views
+        self._widths = 1.0 if line_width is None else LINE_WIDTH / line_width
+        known = np.zeros(ERRORS) if line_width is None else _one(WIDTH, _KNOWN_WIDTH**-2)
+        self._nothing = NOTHING._replace(information=np.diag(known))
+
+    def found(self, pitches: Sequence[float] = PITCHES, heights: Sequence[float] = _FEW_HEIGHTS) -> tuple[Tried, Tried]:
+        """The poses as they are, and without their errors. pitches [rad], heights: errors to start from."""
+        given = self.look(np.zeros(ERRORS))
+        some = self._views[:: -(-len(self._views) // _SOME_VIEWS)]
+        starts = [self.look(np.array([pitch, 0.0, height, 0.0]), some) for height in heights for pitch in pitches]
+        best = given
+        for each in sorted(starts, key=lambda each: each.rank, reverse=True)[:_REFINED]:
+            if each.gain > _LEAST:
+                best = max(best, self.refined(each), key=lambda each: each.rank)
+        if best is given:
+            return given, given
+        scaled = [best, *(self.look(best.errors + _one(HEIGHT, each)) for each in HEIGHTS if each)]
+        return given, self.refined(max(scaled, key=lambda each: each.rank))
+
+    def refined(self, tried: Tried) -> Tried:
+        """The best correction near one that was tried."""
+        best: Tried | None = None
+        for _ in range(_STEPS):
+            step = tried.total - tried.errors
+            if best is not None and (np.abs(step) < _CLOSE).all():
+                break
+            tried = self.look(tried.errors + step)
+            best = tried if best is None else max(best, tried, key=lambda each: each.rank)
+        assert best is not None
+        return best
+
+    def look(self, errors: Floats, views: Sequence[View] | None = None) -> Tried:
+        """Detect in frames with poses without these errors (ERRORS,). views: some of the frames; default: all."""
+        clues = []
+        for each in self._views if views is None else views:
+            try:
+                detections = self._detector.detect(each.image, corrected(each.orientation, errors), each.lens)
+            except GeometryError:  # too low for the object
+                continue
+            found = clues_of(detections)
+            clues.append(found._replace(lines=found.lines._replace(widths=found.lines.widths * self._widths)))
+        step = np.zeros(ERRORS)
+        for _ in range(_SOLUTIONS):
+            evidence = sum((evidence_of(each, step) for each in clues), self._nothing)
+            step, deviations = solved(evidence)
+        width = evidence.vector[WIDTH] / (evidence.information[WIDTH, WIDTH] + EXPECTED[WIDTH] ** -2)
+        if deviations[HEIGHT] > _SCALED:
+            step[HEIGHT] = 0.0
+        gain = sum(evidence_of(each, _one(WIDTH, width)).gain for each in clues)
+        ball_gain = sum(of_balls(each.balls, np.zeros(ERRORS)).gain for each in clues)
+        return Tried(errors, step, deviations, gain, ball_gain, round(evidence.balls), round(evidence.lines))
 
 
 def with_search(state: PoseState, detector: Detector, views: Sequence[View]) -> PoseState:
     """What frames say, with what a search adds to it: errors that are too large for the evidence of small ones."""
-    if state.verdict == "consistent" and state.height is not None:
+    is_consistent = state.verdict == "consistent"
+    if is_consistent and state.height is not None:
         return state
-    given, found = search(detector, views, state.verdict == "consistent")
-    pitch, roll, height = (found.errors + np.clip(found.step, -_LARGEST, _LARGEST))[:WIDTH].tolist()
-    has_scale = found.ball_gain > max(_SURE_BALLS, given.ball_gain + 1.0)
+    search = PoseSearch(_with_lines(detector), views)
+    given, found = search.found([0.0], HEIGHTS) if is_consistent else search.found()
+    pitch, roll, height = found.total[:WIDTH].tolist()
+    has_scale = found.ball_gain > max(SURE_BALLS, given.ball_gain + 1.0)
     is_off = max(abs(pitch), abs(roll)) > _OFF or (has_scale and abs(height) > _OFF_HEIGHT)
     if not is_off or found.gain < given.gain * _BETTER + _SURE:
         return state
@@ -147,43 +199,19 @@ def with_search(state: PoseState, detector: Detector, views: Sequence[View]) -> 
     )
 
 
-def refined(detector: Detector, views: Sequence[View], tried: Tried) -> Tried:
-    """The best correction near one that was tried."""
-    best: Tried | None = None
-    for _ in range(_STEPS):
-        step = np.clip(tried.step, -_LARGEST, _LARGEST)
-        if best is not None and (np.abs(step) < _CLOSE).all():
-            break
-        tried = look(detector, views, tried.errors + step)
-        best = tried if best is None else max(best, tried, key=rank)
-    assert best is not None
-    return best
+def _with_lines(detector: Detector) -> Detector:
+    """A detector that also sees lines, if the package has one for the same balls; otherwise the same."""
+    classes = {each.name for each in detector.manifest.classes}
+    if "line" in classes or "ball" not in classes:
+        return detector
+    with suppress(InputError):  # a robot may lack it
+        settings = replace(detector.settings, object_radius=detector.shape.radius, field_features=True)
+        return Detector.from_file("soccer", settings)
+    return detector
 
 
-def rank(tried: Tried) -> float:
-    """How good a correction is: clues that agree count, balls of the right size count more, and errors that the clues
-    still see count against it."""
-    left = float(np.abs(tried.step[:HEIGHT]).max())
-    return tried.gain + _BALLS_COUNT * tried.ball_gain - _LEFT_COUNTS * math.log1p(left / math.radians(1.0))
-
-
-def look(detector: Detector, views: Sequence[View], errors: Floats) -> Tried:
-    """Detect in frames with poses without these errors (ERRORS,)."""
-    clues = []
-    for each in views:
-        try:
-            detections = detector.detect(each.image, corrected(each.orientation, errors), each.lens)
-        except GeometryError:  # too low for the object
-            continue
-        clues.append(clues_of(detections))
-    step = np.zeros(ERRORS)
-    for _ in range(_SOLUTIONS):
-        found = sum((evidence_of(each, step) for each in clues), NOTHING)
-        step, deviations = solved(found)
-    own = np.zeros(ERRORS)
-    own[WIDTH] = found.vector[WIDTH] / (found.information[WIDTH, WIDTH] + EXPECTED[WIDTH] ** -2)
-    if deviations[HEIGHT] > _SCALED:
-        step[HEIGHT] = 0.0
-    gain = sum(evidence_of(each, own).gain for each in clues)
-    ball_gain = sum(of_balls(each.balls, own).gain for each in clues)
-    return Tried(errors, step, deviations, gain, ball_gain, round(found.balls), round(found.lines))
+def _one(which: int, size: float) -> Floats:
+    """Errors (ERRORS,) of which one is not 0."""
+    errors = np.zeros(ERRORS)
+    errors[which] = size
+    return errors

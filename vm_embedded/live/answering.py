@@ -53,7 +53,7 @@ class Answerer:
         self.pose_check = PoseCheck()
 
     def reload(self, configuration: Configuration, detector: Detector) -> None:
-        """Use another configuration and its detector from now on. Tracks continue; the check of the pose begins anew."""
+        """Use another configuration and its detector from now on. Tracks continue; the pose is checked anew."""
         self.configuration, self.detector = configuration, detector
         self.pose_check = PoseCheck()
         self._tracker.settings = configuration.track
