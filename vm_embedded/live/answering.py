@@ -145,4 +145,4 @@ class Answerer:
                 await asyncio.wait_for(arrived.wait(), left)
             except asyncio.TimeoutError:
                 break
-        return poses.at(shot.captured)
+        return settings.corrected(poses.at(shot.captured))
