@@ -14,9 +14,10 @@ VERDICTS = ("unknown", "consistent", "doubtful", "wrong")
 class PoseState(Record):
     """What the frames so far say about the camera's pose.
 
-    verdict: wrong, doubtful or consistent; unknown if the frames show too little. pitch, roll [deg]: true minus assumed
-    one, as estimated; null if unknown. height [%]: how much larger the true one is; null if unknown. frames: number of
-    different pictures. balls, lines: number of clues that it rests on.
+    verdict: wrong, doubtful or consistent; unknown if the frames show too little. pitch [deg]: error of the pitch: true
+    minus assumed one; null if unknown. roll [deg]: error of the roll: true minus assumed one; null if unknown. height
+    [%]: how much larger the true height is; null if unknown. frames: number of different pictures. balls: number of
+    balls that it rests on. lines: number of pieces of lines that it rests on.
     """
 
     verdict: Annotated[str, Sent(allowed=VERDICTS)]

@@ -48,8 +48,8 @@ class Segment(Record):
     ends: Annotated[Floats, Sent(3, (2, 2))]
     pixels: Annotated[Floats, Sent(1, (2, 2), null=True)]
     confidence: Annotated[float, SHARE]
-    width: float
-    turn_error: float
+    width: float = math.nan
+    turn_error: float = math.nan
 
     @property
     def length(self) -> float:

@@ -40,6 +40,9 @@ _DIRECTION_PIXELS = 1.0
 _TURN_NOISE = 0.012
 """Standard deviation of a line's direction [rad], in addition to what its ridge says: fields are painted by hand."""
 
+_SEEN = 0.75
+"""Share of a line's turn that is seen: lines are found near two directions at a right angle."""
+
 _WIDTH_NOISE = 0.12
 """Standard deviation of the logarithm of a line's width."""
 
@@ -158,7 +161,7 @@ def of_lines(lines: LineClues, height: float, errors: Floats) -> Evidence:
     c, s = (along[kept] / lengths[kept, None]).T
     zero = np.zeros(len(x))
     # How the direction turns [rad], and how the width grows, with each error.
-    turns = np.array([x * s * c - y * c * c, y * s * c - x * s * s, zero, zero])
+    turns = _SEEN * np.array([x * s * c - y * c * c, y * s * c - x * s * s, zero, zero])
     grows = np.array([y * s * c - x * (1.0 + s * s), y * (1.0 + c * c) - x * s * c, zero + 1.0, zero - 1.0])
     noise = np.hypot(turn_errors[kept], _TURN_NOISE)
     angles = np.arctan2(s, c)

@@ -1,0 +1,86 @@
+"""The check of the pose: rendered pictures of a field agree with their true poses, and speak against wrong ones."""
+
+import math
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.vm_embedded.cli.test_detect_files import DEMO
+from vm_embedded import Detector, Orientation, read_lens_file
+from vm_embedded.detection.pose_check import PoseCheck
+from vm_embedded.detection.pose_search import View, corrected, with_search
+from vm_embedded.detection.pose_state import PoseState
+from vm_embedded.geometry.radial_lenses import Rectilinear
+
+PICTURES = sorted(DEMO.parent.glob("image*.jpg"))
+
+
+@cache
+def detector():
+    return Detector.from_file("soccer")
+
+
+@cache
+def views():
+    files = [read_lens_file(each.with_name(each.name.replace("image", "lens")).with_suffix(".yaml")) for each in PICTURES]
+    return [View(cv2.imread(str(each)), file.lens, file.orientation) for each, file in zip(PICTURES, files, strict=True)]
+
+
+def assumed(pitch=0.0, roll=0.0, height=1.0):
+    """The views with poses that have these errors [deg], and this factor of the height."""
+    errors = np.array([math.radians(pitch), math.radians(roll), math.log(height), 0.0])
+    return [View(each.image, each.lens, corrected(each.orientation, -errors)) for each in views()]
+
+
+def state_after(seen):
+    check = PoseCheck()
+    for each in seen:
+        found = check.update(detector().detect(each.image, each.orientation, each.lens))
+    assert found.pose == check.state
+    return check.state
+
+
+def test_right_poses_are_consistent():
+    state = state_after(views())
+    assert state.verdict == "consistent"
+    assert abs(state.pitch) < 1.0 and abs(state.roll) < 1.0
+    assert state.lines > 20 and state.frames == len(PICTURES)
+
+
+@pytest.mark.parametrize(("name", "error"), [("pitch", 4.0), ("pitch", -4.0), ("roll", 4.0), ("roll", -4.0)])
+def test_an_error_of_all_poses_is_found(name, error):
+    state = state_after(assumed(**{name: error}))
+    assert state.verdict in ("doubtful", "wrong")
+    assert getattr(state, name) == pytest.approx(error, abs=2.0)
+
+
+def test_a_picture_that_is_seen_again_tells_nothing_more():
+    first = views()[2]
+    assert state_after([first]) == state_after([first] * 20)
+
+
+def test_an_empty_carpet_leaves_the_pose_unknown():
+    random = np.random.default_rng(0)
+    lens = Rectilinear.from_horizontal_fov(1.0, (640, 480))
+    carpets = [
+        View(random.normal((60, 120, 50), 6.0, (480, 640, 3)).clip(0, 255).astype(np.uint8), lens, pose)
+        for pose in [Orientation.from_roll_pitch(0.6, 0.0, 0.9)] * 12
+    ]
+    state = state_after(carpets)
+    assert state.verdict == "unknown"
+    assert state.pitch is None and state.roll is None and state.height is None
+    assert with_search(state, detector(), carpets[:2]) == state
+
+
+def test_a_search_finds_an_error_that_is_too_large_for_the_check():
+    found = with_search(PoseState(verdict="unknown"), detector(), assumed(pitch=17.0)[:5])
+    assert found.verdict == "wrong"
+    assert found.pitch == pytest.approx(17.0, abs=5.0)
+
+
+def test_a_corrected_pose_keeps_its_yaw():
+    pose = Orientation.from_roll_pitch(0.5, 0.1, 0.3, 2.0)
+    better = corrected(pose, np.array([0.02, -0.01, math.log(1.1), 0.3]))
+    assert (better.yaw, better.pitch, better.roll, better.height) == pytest.approx((2.0, 0.32, 0.09, 0.55))
