@@ -17,6 +17,7 @@ from ..field.pose_evidence import (
     ERRORS,
     EXPECTED,
     HEIGHT,
+    NO_LINES,
     NOTHING,
     PITCH,
     BallClues,
@@ -40,9 +41,12 @@ _WORTH = 0.25
 _KNOWN = np.array([math.radians(1.5), math.radians(1.5), 0.05])
 """Standard deviations below which errors of pitch, roll and height are known."""
 
-_DOUBTFUL = np.array([math.radians(1.8), math.radians(1.8), 0.06])
+_DOUBTFUL = np.array([math.radians(1.8), math.radians(1.8), 0.05])
 _WRONG = np.array([math.radians(2.5), math.radians(2.5), 0.12])
 """Errors of pitch, roll and height that a right pose may have, because clues share errors."""
+
+_RIGHT = np.array([math.radians(2.2), math.radians(2.2), math.inf])
+"""Errors of pitch and roll that must be ruled out for a right pose."""
 
 _DOUBT_AT, _WRONG_AT = 2.0, 3.0
 """Standard deviations by which an error must be larger."""
@@ -69,10 +73,13 @@ class PoseCheck:
             detections = check.update(detector.detect(image, orientation, lens))
             print(detections.pose.verdict)
 
-    A robot's poses change; the check finds what they have in common: errors of the mount, the joints or the lens.
+    every: a picture is looked at only if so many frames have passed: those of a fast camera are much alike, and the
+    check would take a few percent of the time. A robot's poses change; the check finds what they have in common: errors
+    of the mount, the joints or the lens.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, every: int = 1) -> None:
+        self._every, self._since = every, every
         self.evidence = NOTHING
         self._frames = 0.0
         self._above = self._looked = 0.0  # sum of angles of field above the horizon [rad], and pictures looked at
@@ -85,7 +92,9 @@ class PoseCheck:
         """The same detections with what they and those before say about the pose."""
         if not detections.manifest.peaks:  # its sizes are as coarse as its mesh
             return detections
-        if self._is_new(detections):
+        self._since += 1
+        if self._since >= self._every and self._is_new(detections):
+            self._since = 0
             if self.deviations[PITCH] > _KNOWN[PITCH]:
                 self._look_above(detections)
             self.add(evidence_of(clues_of(detections), self.errors))
@@ -124,7 +133,8 @@ class PoseCheck:
         elif (sizes - _DOUBT_AT * deviations > _DOUBTFUL).any() or (not known[PITCH] and self.field_above):
             verdict = "doubtful"
         else:
-            verdict = "consistent" if known[:HEIGHT].all() else "unknown"
+            is_right = (sizes + _DOUBT_AT * deviations < _RIGHT)[:HEIGHT].all()
+            verdict = "consistent" if is_right else "unknown"
         pitch, roll, height = (
             float(value) if is_known or abs(value) > _WRONG_AT * deviation else None
             for value, is_known, deviation in zip(errors, known, deviations, strict=True)
@@ -156,12 +166,11 @@ def clues_of(detections: Detections) -> Clues:
     """What a frame shows that tells about the pose."""
     view = detections.observation.view
     back = _to_level(view)
-    segments = () if detections.field is None else detections.field.lines
-    lines = LineClues(
-        np.array([each.ends for each in segments]).reshape(-1, 2, 2) @ back.T,
-        np.array([each.turn_error for each in segments]),
-        np.array([each.width for each in segments]),
-    )
+    ridges = None if detections.field is None else detections.field.ridges
+    lines = NO_LINES
+    if ridges is not None:
+        ends, turn_errors, widths = ridges.measured()
+        lines = LineClues(ends @ back.T, turn_errors, widths)
     large = [each for each in detections if each.radius > _SMALLEST]
     bearings = np.array([each.bearing for each in large]).reshape(-1, 3)
     bearings[:, :2] = bearings[:, :2] @ back.T

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Singles
 from ..borders.records import SHARE, SIZE, Record, Sent
+from .ridge_edges import Ridges
 
 _PLACE = Sent(3, (2,))
 
@@ -41,15 +42,12 @@ class Segment(Record):
     """A straight piece of a field line: its middle line.
 
     ends (2, 2) [m]: both ends on the plane. pixels (2, 2) [px]: of the ends; NaN outside of the picture. confidence:
-    mean probability of its points, 0 to 1. width [m]: as the picture shows it; NaN if it is too narrow there or hidden.
-    turn_error [rad]: standard deviation of its direction; NaN if the picture does not show its edges.
+    mean probability of its points, 0 to 1.
     """
 
     ends: Annotated[Floats, Sent(3, (2, 2))]
     pixels: Annotated[Floats, Sent(1, (2, 2), null=True)]
     confidence: Annotated[float, SHARE]
-    width: float = math.nan
-    turn_error: float = math.nan
 
     @property
     def length(self) -> float:
@@ -113,7 +111,7 @@ class FieldFeatures(Record):
     first, as seen from the camera. robots: robots and other obstacles, nearest first. lines: straight pieces of the
     field lines, longest first; a line may have several. circle: the center circle, if the picture shows it. crossings:
     where two lines meet at a right angle. line_points (p, 2) [m]: thinned points on lines, with line_confidences (p,).
-    border: the visible border, if the picture shows it.
+    border: the visible border, if the picture shows it. ridges: the lines in the picture, to measure them.
     """
 
     posts: Annotated[tuple[Upright, ...], Sent()]
@@ -125,3 +123,4 @@ class FieldFeatures(Record):
     line_points: Floats
     line_confidences: Singles
     border: Annotated[Border | None, Sent(null=True)]
+    ridges: Ridges | None = None

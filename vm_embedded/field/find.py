@@ -43,7 +43,7 @@ def find_features(
     near = line_points(points)
     likely = near.part((near.weights > LEAST).nonzero()[0])
     pieces, circle = _straight_and_round(near, likely)
-    pieces = pieces_on_ridges(pieces, points, profiles)
+    pieces, ridges = pieces_on_ridges(pieces, points, profiles)
     confidences = [float(likely.weights.take(each.members).sum()) / len(each.members) for each in pieces]
     crossings = possible_crossings(pieces, confidences)
     behind = np.array([each for _, *both in crossings for each in both], dtype=np.complex128)
@@ -52,12 +52,7 @@ def find_features(
     places = np.concatenate([ends, border, behind.view(np.float64).reshape(-1, 2)])
     pixels = to_pixels(places)  # faster at once
     shown = np.isfinite(pixels[len(ends) + len(border) :, 0]).reshape(-1, 2).tolist()
-    lines = tuple(
-        Segment(its_ends, shown_at, confidence, each.width, each.turn_error)
-        for each, its_ends, shown_at, confidence in zip(
-            pieces, ends.reshape(-1, 2, 2), pixels[: len(ends)].reshape(-1, 2, 2), confidences, strict=True
-        )
-    )
+    lines = tuple(map(Segment, ends.reshape(-1, 2, 2), pixels[: len(ends)].reshape(-1, 2, 2), confidences))
     thinned, likelihoods = _thinned(likely)
     return FieldFeatures(
         posts=posts,
@@ -69,6 +64,7 @@ def find_features(
         line_points=thinned,
         line_confidences=likelihoods,
         border=Border(border, pixels[len(ends) : len(ends) + len(border)]) if len(border) else None,
+        ridges=ridges,
     )
 
 

@@ -101,17 +101,12 @@ def tolerance(offsets: Number, leaning: Number, ground: GroundPoints) -> Number:
 
 class Piece(NamedTuple):
     """A straight piece of a line: its ends (2, 2) [m], its length [m], the numbers of its likely points, and its
-    support: the sum of what all points on it have above the probability from which a point speaks for a line.
-
-    width [m], turn_error [rad]: see Segment; NaN if they were not measured.
-    """
+    support: the sum of what all points on it have above the probability from which a point speaks for a line."""
 
     ends: Floats
     length: float
     members: Chosen
     support: float
-    width: float = math.nan
-    turn_error: float = math.nan
 
 
 def line_points(points: GroundPoints) -> LinePoints:

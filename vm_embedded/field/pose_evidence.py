@@ -93,12 +93,16 @@ NOTHING = Evidence(np.zeros((ERRORS, ERRORS)), np.zeros(ERRORS))
 class LineClues(NamedTuple):
     """Lines in the level frame: x ahead of the camera, origin below it.
 
-    ends (m, 2, 2) [m]. turn_errors (m,) [rad], widths (m,) [m]: see Segment; NaN where unknown.
+    ends (m, 2, 2) [m]. turn_errors (m,) [rad]: standard deviations of their directions. widths (m,) [m]: NaN where
+    unknown. See Ridges.measured.
     """
 
     ends: Floats
     turn_errors: Floats
     widths: Floats
+
+
+NO_LINES = LineClues(np.empty((0, 2, 2)), np.empty(0), np.empty(0))
 
 
 class BallClues(NamedTuple):
@@ -154,7 +158,7 @@ def of_lines(lines: LineClues, height: float, errors: Floats) -> Evidence:
     ends, turn_errors, widths = lines
     along = ends[:, 1] - ends[:, 0]
     lengths = np.hypot(along[:, 0], along[:, 1])
-    kept = (lengths > _SHORTEST) & (turn_errors == turn_errors)
+    kept = lengths > _SHORTEST
     if not kept.any():
         return NOTHING
     x, y = 0.5 * (ends[kept, 0] + ends[kept, 1]).T / height

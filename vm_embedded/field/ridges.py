@@ -2,8 +2,7 @@
 
 Rings of the mesh are far from each other beyond a few meters, so points alone say only roughly where a line is that
 runs along a ring. The picture knows better: brightness across a piece, at places along it, shows the ridge. The piece
-moves there. One without a ridge along most of it needs more points that speak for it. The edges of the ridge also give
-the width of the line, and its direction more exactly: both tell whether the pose of the camera is right.
+moves there. One without a ridge along most of it needs more points that speak for it.
 """
 
 from __future__ import annotations
@@ -16,6 +15,7 @@ import numpy as np
 from ..arrays import Chosen, Floats, Singles
 from .ground_points import GroundPoints, leaning
 from .lines import Piece, tolerance
+from .ridge_edges import Ridges
 
 Profiles = Callable[[Floats, int], tuple[Singles, Floats]]
 """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of each stretch (n, 2, 2) [m] on
@@ -60,23 +60,6 @@ _BLUR = 1.3
 _DARK = 8.0
 """Brightness that is added to that of the surroundings: contrast in dark pictures is noise."""
 
-_REACH = 10
-"""Samples on each side of a ridge that are searched for its edge."""
-
-_WINDOW = np.arange(-_REACH, _REACH + 1)
-
-_FEWEST = 5
-"""Stations that must show both edges of a ridge to measure it."""
-
-_NARROWEST = 5.0
-"""Width of the narrowest ridge [px] that is measured."""
-
-_SPREAD = 3.0
-"""Blur widens an edge by this much [px]; the squares of it and of the line's width add up."""
-
-_ROUNDING = 0.25
-"""Error of the place of a ridge [samples], at least."""
-
 _LIMITS = (-0.3, 0.6)
 """Contrasts outside of these limits count as the limits: a station at a reflection is one of many."""
 
@@ -93,13 +76,15 @@ _MOST_SUPPORT = 6.0
 """More support does not count."""
 
 
-def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Profiles) -> list[Piece]:
-    """The pieces that points and picture speak for, moved to their ridges, in the same order.
+def pieces_on_ridges(
+    pieces: Sequence[Piece], points: GroundPoints, profiles: Profiles
+) -> tuple[list[Piece], Ridges | None]:
+    """The pieces that points and picture speak for, moved to their ridges, in the same order; and the ridges of all.
 
     points: of the frame; their spacing says how far a ridge may be. profiles: brightness of the frame.
     """
     if not pieces:
-        return []
+        return [], None
     ends = np.array([each.ends for each in pieces])  # (p, 2, 2)
     lengths = np.array([each.length for each in pieces])
     normals = (ends[:, 1] - ends[:, 0])[:, ::-1] * (-1.0, 1.0) / lengths[:, None]
@@ -112,17 +97,19 @@ def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Pr
     middle = np.sort(pixels.reshape(-1, _STATIONS), axis=1)[:, _STATIONS // 2]
     widths = np.maximum(_WIDTH / steps, _BLUR / np.maximum(middle, 1e-6))
     contrasts = _contrasts(brightness.reshape(-1, _STATIONS, _SAMPLES), widths)
-    shifts, shares, at = _best_shifts(contrasts, free, lengths)
-    spans = reach @ (_SHARES.T / _HALF)  # (p, T): of a sample [m]
-    turned, widths, errors = _measured(brightness, at, spans, pixels.reshape(-1, _STATIONS), shifts, lengths)
-    moved = ends + turned[:, :, None] * normals[:, None]
-    return [
-        Piece(its_ends, math.hypot(piece.length, last - first), piece.members, piece.support, width, error)
-        for piece, its_ends, (first, last), share, width, error in zip(
-            pieces, moved, turned.tolist(), shares.tolist(), widths.tolist(), errors.tolist(), strict=True
-        )
+    shifts, near, beside = _best_shifts(contrasts, free, lengths)
+    shown = beside.max(axis=1) > _CONTRAST
+    shares = shown.sum(axis=1) / _STATIONS
+    moved = ends + shifts[:, :, None] * normals[:, None]
+    at = near[:, 1] + beside.argmax(axis=1) - 1
+    spans = reach @ (_SHARES.T / _HALF)
+    ridges = Ridges(brightness, at, shown, spans, pixels.reshape(-1, _STATIONS), ends, normals, lengths, _AT)
+    kept = [
+        Piece(its_ends, math.hypot(piece.length, last - first), piece.members, piece.support)
+        for piece, its_ends, (first, last), share in zip(pieces, moved, shifts.tolist(), shares.tolist(), strict=True)
         if share + _SUPPORT_WORTH * min(piece.support, _MOST_SUPPORT) > _LEAST
     ]
+    return kept, ridges
 
 
 def _free_reach(ends: Floats, normals: Floats, points: GroundPoints) -> Floats:
@@ -166,9 +153,9 @@ def _contrasts(brightness: Singles, widths: Floats) -> Singles:
     return np.asarray(np.minimum(np.maximum(contrasts, _LIMITS[0]), _LIMITS[1]))
 
 
-def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Floats, Floats, Chosen]:
-    """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, the share of stations (p,) with a
-    ridge there, and the positions (p, T) of its samples among those of all profiles; -1 for a station without it.
+def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Floats, Chosen, Singles]:
+    """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, the positions (p, 3, T) of the
+    samples there and beside, and their contrasts (p, 3, T).
 
     contrasts (p, T, N): see _contrasts. free (p, 2) [m]: how far the ridge may be from the ends. lengths (p,) [m]: of
     the pieces.
@@ -186,60 +173,4 @@ def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Flo
     rows = np.arange(count)
     near = places.reshape(count, -1, _STATIONS)[rows, best][:, None] + _BESIDE  # (p, 3, T)
     beside = contrasts.take(near, mode="clip")  # the first and the last sample have the contrast 0
-    middle = beside.argmax(axis=1)
-    shown = np.take_along_axis(beside, middle[:, None], axis=1)[:, 0] > _CONTRAST
-    at = np.where(shown, near[:, 1] + middle - 1, -1)
-    return np.array([one[rows, best // _SHIFTS], other[rows, best % _SHIFTS]]).T, shown.sum(axis=1) / _STATIONS, at
-
-
-def _measured(
-    brightness: Singles, at: Chosen, spans: Floats, pixels: Floats, shifts: Floats, lengths: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Shifts (p, 2) [m] of the ends to the middle of the ridges, their widths (p,) [m], and the standard deviations
-    (p,) [rad] of their directions; NaN where too few stations show both edges.
-
-    brightness (p * T, N): of the profiles. at (p, T): see _best_shifts. spans, pixels (p, T): of a sample [m], [px].
-    shifts (p, 2): those without this measurement. lengths (p,) [m]: of the pieces.
-    """
-    sample = at % _SAMPLES - _HALF  # from the middle of its profile
-    inside = (at >= 0) & (np.abs(sample) < _HALF - 2)
-    values = brightness.take(np.clip(at[:, :, None] + _WINDOW, 0, brightness.size - 1))  # (p, T, 2 W + 1)
-    hidden = np.abs(sample[:, :, None] + _WINDOW) > _HALF  # in the profile beside it
-    values = np.where(hidden | np.isnan(values), np.float32(np.inf), values)
-    right, left = values[:, :, _REACH:], values[:, :, _REACH::-1]
-    peak = np.maximum(np.maximum(right[:, :, 0], right[:, :, 1]), left[:, :, 1])
-    half = 0.5 * (peak + np.maximum(right.min(axis=2), left.min(axis=2)))
-    edges = np.stack([right, left])  # (2, p, T, W + 1)
-    below = edges < half[:, :, None]
-    first = below.argmax(axis=3)
-    outer = np.take_along_axis(edges, first[..., None], axis=3)[..., 0]
-    inner = np.take_along_axis(edges, np.maximum(first - 1, 0)[..., None], axis=3)[..., 0]
-    inside &= (first > 0).all(axis=0) & np.isfinite(inner).all(axis=0) & np.isfinite(peak)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        beyond, before = np.where(inside, first - 1 + (inner - half) / np.maximum(inner - outer, 1e-3), 0.0)
-        wide = np.where(inside, beyond + before, np.nan)
-    off = np.where(inside, (sample + 0.5 * (beyond - before)) * spans, 0.0)
-    weights = inside / (spans * spans)
-    count = inside.sum(axis=1)
-    total = np.maximum(weights.sum(axis=1), 1e-12)
-    middle = (weights * _AT).sum(axis=1) / total
-    mean = (weights * off).sum(axis=1) / total
-    along = _AT - middle[:, None]
-    spread = np.maximum((weights * along * along).sum(axis=1), 1e-12)
-    slope = (weights * along * off).sum(axis=1) / spread
-    rest = off - mean[:, None] - slope[:, None] * along
-    noise = (weights * rest * rest).sum(axis=1) / np.maximum(count - 2, 1) + _ROUNDING**2
-    good = count >= _FEWEST
-    ends = np.array([mean - slope * middle, mean + slope * (1.0 - middle)]).T
-    shown = wide * pixels
-    with np.errstate(invalid="ignore"):
-        sharp = np.where(shown > _NARROWEST, np.sqrt(np.maximum(1.0 - (_SPREAD / shown) ** 2, 0.0)), np.nan)
-    widths = np.where(good, _median(wide * spans * sharp), np.nan)
-    return np.where(good[:, None], ends, shifts), widths, np.where(good, np.sqrt(noise / spread) / lengths, np.nan)
-
-
-def _median(values: Floats) -> Floats:
-    """Medians (p,) of values (p, T), of those that are not NaN; NaN if fewer than _FEWEST are."""
-    count = (values == values).sum(axis=1)
-    middle = np.sort(values, axis=1)[np.arange(len(values)), np.maximum(count - 1, 0) // 2]  # NaN is last
-    return np.where(count >= _FEWEST, middle, np.nan)
+    return np.array([one[rows, best // _SHIFTS], other[rows, best % _SHIFTS]]).T, near, beside

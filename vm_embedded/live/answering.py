@@ -23,6 +23,9 @@ from .counters import Counters
 from .frame_watchdog import FrameWatchdog
 from .health import Health
 
+_EVERY = 3
+"""Only each third frame tells about the pose."""
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
@@ -50,12 +53,12 @@ class Answerer:
         self.configuration, self.detector = configuration, detector
         self._poses, self._counters, self._health, self._watchdog = poses, counters, health, watchdog
         self._tracker = Tracker(configuration.track)
-        self.pose_check = PoseCheck()
+        self.pose_check = PoseCheck(_EVERY)
 
     def reload(self, configuration: Configuration, detector: Detector) -> None:
         """Use another configuration and its detector from now on. Tracks continue; the pose is checked anew."""
         self.configuration, self.detector = configuration, detector
-        self.pose_check = PoseCheck()
+        self.pose_check = PoseCheck(_EVERY)
         self._tracker.settings = configuration.track
 
     async def answer(self, shot: Shot) -> Answer | None:

@@ -84,8 +84,10 @@ def test_lines_and_balls_tell_pitch_roll_and_height(seed, pitch, roll, height, h
     true = (pitch, roll, height)
     seen, assumed = lines(true, random, heading)
     errors, deviations = estimate(Clues(seen, balls(true, random), assumed))
-    assert np.abs(errors[:3] - true) == pytest.approx(0.0, abs=0.03)
-    assert (deviations[:2] < 0.01).all() and deviations[HEIGHT] < 0.06
+    assert errors[:2] == pytest.approx(true[:2], abs=0.02)
+    assert errors[HEIGHT] == pytest.approx(height, abs=0.05)
+    assert (deviations[:2] < 0.02).all()
+    assert deviations[HEIGHT] < 0.06
 
 
 @given(st.integers(0, 99), ANGLES, ANGLES, st.floats(-3.0, 3.0))
@@ -111,4 +113,5 @@ def test_without_clues_nothing_is_known():
     empty = Clues(LineClues(np.empty((0, 2, 2)), np.empty(0), np.empty(0)), balls((0, 0, 0), np.random, 0), 0.7)
     assert evidence_of(empty, np.zeros(ERRORS)).gain == 0.0
     errors, deviations = solved(evidence_of(empty, np.zeros(ERRORS)) + NOTHING)
-    assert (errors == 0.0).all() and deviations == pytest.approx(EXPECTED)
+    assert (errors == 0.0).all()
+    assert deviations == pytest.approx(EXPECTED)
