@@ -93,7 +93,7 @@ class Ridges:
         behind = edges.ravel().take(rows + first.ravel()).reshape(first.shape)
         before = edges.ravel().take(rows + np.maximum(first.ravel() - 1, 0)).reshape(first.shape)
         seen = seen & (first > 0).all(axis=0) & np.isfinite(before).all(axis=0)
-        with np.errstate(invalid="ignore"):  # infinite where nothing is seen
+        with np.errstate(invalid="ignore", divide="ignore"):  # infinite where nothing is seen
             share = np.where(seen, (before - half) / (before - behind), np.float32(0.0))
         beyond, below = first - 1 + share
         return np.where(seen, sample + 0.5 * (beyond - below), 0.0), np.where(seen, beyond + below, 0.0)
