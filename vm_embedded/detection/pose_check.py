@@ -128,12 +128,13 @@ class PoseCheck:
         errors, deviations = self.errors[:3], self.deviations[:3]
         sizes = np.abs(errors)
         known = deviations < _KNOWN
+        certain = np.where(known, _DOUBT_AT, _WRONG_AT)
         if (sizes - _WRONG_AT * deviations > _WRONG).any():
             verdict = "wrong"
-        elif (sizes - _DOUBT_AT * deviations > _DOUBTFUL).any() or (not known[PITCH] and self.field_above):
+        elif (sizes - certain * deviations > _DOUBTFUL).any() or (not known[PITCH] and self.field_above):
             verdict = "doubtful"
         else:
-            is_right = (sizes + _DOUBT_AT * deviations < _RIGHT)[:HEIGHT].all()
+            is_right = (sizes + _WRONG_AT * deviations < _RIGHT)[:HEIGHT].all()
             verdict = "consistent" if is_right else "unknown"
         pitch, roll, height = (
             float(value) if is_known or abs(value) > _WRONG_AT * deviation else None
