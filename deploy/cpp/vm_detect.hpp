@@ -191,17 +191,17 @@ struct FieldFeatures {
 struct PoseState {
     // wrong, doubtful or consistent; unknown if the frames show too little
     char verdict{};
-    // true minus assumed one, as estimated; null if unknown
+    // error of the pitch: true minus assumed one; null if unknown [deg]
     float pitch{};
-    // true minus assumed one, as estimated; null if unknown [deg]
+    // error of the roll: true minus assumed one; null if unknown [deg]
     float roll{};
-    // how much larger the true one is; null if unknown [%]
+    // how much larger the true height is; null if unknown [%]
     float height{};
     // number of different pictures
     std::uint32_t frames{};
-    // number of clues that it rests on
+    // number of balls that it rests on
     std::uint32_t balls{};
-    // number of clues that it rests on
+    // number of pieces of lines that it rests on
     std::uint32_t lines{};
 };
 
