@@ -41,7 +41,7 @@ _WORTH = 0.25
 _KNOWN = np.array([math.radians(1.5), math.radians(1.5), 0.05])
 """Standard deviations below which errors of pitch, roll and height are known."""
 
-_DOUBTFUL = np.array([math.radians(1.8), math.radians(1.8), 0.05])
+_DOUBTFUL = np.array([math.radians(1.6), math.radians(1.6), 0.05])
 _WRONG = np.array([math.radians(2.5), math.radians(2.5), 0.12])
 """Errors of pitch, roll and height that a right pose may have, because clues share errors."""
 

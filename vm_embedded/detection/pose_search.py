@@ -29,10 +29,10 @@ PITCHES = np.radians([0.0, 8.0, -8.0, 17.0, -17.0, 28.0]).tolist()
 HEIGHTS = np.log([1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8]).tolist()
 """Errors of the height that are tried."""
 
-_FEW_HEIGHTS = np.log([1.0, 0.5, 2.0]).tolist()
+_FEW_HEIGHTS = np.log([1.0, 0.7, 1.4, 0.5, 2.0]).tolist()
 """Those that are tried with each pitch."""
 
-_SOME_VIEWS = 3
+_SOME_VIEWS = 2
 """Frames that are looked at with each start."""
 
 _REFINED = 3
@@ -133,8 +133,11 @@ class PoseSearch:
         given = self.look(np.zeros(ERRORS))
         some = self._views[:: -(-len(self._views) // _SOME_VIEWS)]
         starts = [self.look(np.array([pitch, 0.0, height, 0.0]), some) for height in heights for pitch in pitches]
+        starts.sort(key=lambda each: each.rank, reverse=True)
+        if not starts[0].errors.any():  # the given poses: no other start is better
+            return given, given
         best = given
-        for each in sorted(starts, key=lambda each: each.rank, reverse=True)[:_REFINED]:
+        for each in starts[:_REFINED]:
             if each.gain > _LEAST:
                 best = max(best, self.refined(each), key=lambda each: each.rank)
         if best is given:
