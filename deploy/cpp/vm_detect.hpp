@@ -203,6 +203,12 @@ struct PoseState {
     std::uint32_t balls{};
     // number of pieces of lines that it rests on
     std::uint32_t lines{};
+    // correction that is added to the pitch; only with [pose] correct [deg]
+    float added_pitch{};
+    // correction that is added to the roll [deg]
+    float added_roll{};
+    // correction of the height [%]
+    float added_height{};
 };
 
 // A frame of a live camera.
@@ -303,7 +309,7 @@ void read_list(Cursor& head, Cursor& body, std::optional<Item>& made) {
 }
 
 // messages: readers
-constexpr std::uint32_t layout_number = 3608848253U;
+constexpr std::uint32_t layout_number = 4388516U;
 constexpr std::size_t header_bytes = 132;
 
 inline void read(Cursor& from, Track& made) {
@@ -373,6 +379,9 @@ inline void read(Cursor& from, PoseState& made) {
     read(from, made.frames);
     read(from, made.balls);
     read(from, made.lines);
+    read(from, made.added_pitch);
+    read(from, made.added_roll);
+    read(from, made.added_height);
 }
 
 inline void read(Cursor& head, Cursor& body, Frame& made) {

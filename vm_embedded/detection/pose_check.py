@@ -27,6 +27,7 @@ from ..field.pose_evidence import (
     evidence_of,
     solved,
 )
+from ..geometry.orientation import Orientation
 from .above_horizon import field_above_horizon
 from .detections import Detections
 from .pose_state import PoseState
@@ -50,6 +51,12 @@ _RIGHT = np.array([math.radians(2.2), math.radians(2.2), math.inf])
 
 _DOUBT_AT, _WRONG_AT = 2.0, 3.0
 """Standard deviations by which an error must be larger."""
+
+_RATE = 0.05
+"""Share of the known errors by which a picture changes the correction."""
+
+_FARTHEST = np.array([math.radians(3.0), math.radians(3.0), math.log(1.1)])
+"""Largest correction."""
 
 _SMALLEST = 3.0
 """Least radius of an object whose size is a clue [px]."""
@@ -76,9 +83,12 @@ class PoseCheck:
     every: a picture is looked at only if so many frames have passed: those of a fast camera are much alike, and the
     check would take a few percent of the time. A robot's poses change; the check finds what they have in common: errors
     of the mount, the joints or the lens.
+
+    corrects: `corrected` slowly takes such errors out of poses; detect with these then.
     """
 
-    def __init__(self, every: int = 1) -> None:
+    def __init__(self, every: int = 1, corrects: bool = False) -> None:
+        self._corrects, self._correction = corrects, np.zeros(HEIGHT + 1)
         self._every, self._since = every, every
         self.evidence = NOTHING
         self._frames = 0.0
@@ -111,7 +121,25 @@ class PoseCheck:
         self.evidence = self.evidence.scaled(_KEPT, 1.0) + found.scaled(1.0, _WORTH)
         self._frames = self._frames * _KEPT + 1.0
         self.errors, self.deviations = solved(self.evidence)
+        if self._corrects:
+            self._correct()
         self._state = self._judged()
+
+    def corrected(self, orientation: Orientation) -> Orientation:
+        """A pose with the correction so far."""
+        if not self._correction.any():
+            return orientation
+        pitch, roll, height = self._correction.tolist()
+        return orientation.adjusted(pitch, roll, math.exp(height))
+
+    def _correct(self) -> None:
+        """Correct by a small share of the errors that are known. The evidence so far then speaks for smaller errors."""
+        known = self.deviations[: HEIGHT + 1] < _KNOWN
+        new = np.clip(self._correction + _RATE * known * self.errors[: HEIGHT + 1], -_FARTHEST, _FARTHEST)
+        moved = np.append(new - self._correction, 0.0)
+        self._correction = new
+        self.evidence = self.evidence._replace(vector=self.evidence.vector - self.evidence.information @ moved)
+        self.errors = solved(self.evidence)[0]
 
     @property
     def field_above(self) -> float:
@@ -148,7 +176,18 @@ class PoseCheck:
             frames=round(self._frames),
             balls=round(self.evidence.balls),
             lines=round(self.evidence.lines),
+            **self._added(),
         )
+
+    def _added(self) -> dict[str, float]:
+        if not self._corrects:
+            return {}
+        pitch, roll, height = self._correction.tolist()
+        return {
+            "added_pitch": math.degrees(pitch),
+            "added_roll": math.degrees(roll),
+            "added_height": 100.0 * math.expm1(height),
+        }
 
     def _is_new(self, detections: Detections) -> bool:
         """Whether a picture differs from the last one that counted: a camera that stands still learns nothing more."""

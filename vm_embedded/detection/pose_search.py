@@ -114,9 +114,7 @@ class Tried:
 def corrected(orientation: Orientation, errors: Floats) -> Orientation:
     """The orientation without these errors (ERRORS,)."""
     pitch, roll, height = errors[:WIDTH].tolist()
-    return Orientation.from_roll_pitch(
-        orientation.height * math.exp(height), orientation.roll + roll, orientation.pitch + pitch, orientation.yaw
-    )
+    return orientation.adjusted(pitch, roll, math.exp(height))
 
 
 class PoseSearch:

@@ -53,12 +53,12 @@ class Answerer:
         self.configuration, self.detector = configuration, detector
         self._poses, self._counters, self._health, self._watchdog = poses, counters, health, watchdog
         self._tracker = Tracker(configuration.track)
-        self.pose_check = PoseCheck(_EVERY)
+        self.pose_check = PoseCheck(_EVERY, configuration.pose.correct)
 
     def reload(self, configuration: Configuration, detector: Detector) -> None:
         """Use another configuration and its detector from now on. Tracks continue; the pose is checked anew."""
         self.configuration, self.detector = configuration, detector
-        self.pose_check = PoseCheck(_EVERY)
+        self.pose_check = PoseCheck(_EVERY, configuration.pose.correct)
         self._tracker.settings = configuration.track
 
     async def answer(self, shot: Shot) -> Answer | None:
@@ -66,7 +66,8 @@ class Answerer:
         if self._refuse_late(shot):
             return None
         try:
-            lens, orientation = self._lens(shot), await self._orientation(shot)
+            lens, given = self._lens(shot), await self._orientation(shot)
+            orientation = self.pose_check.corrected(given)
             self._health.pose_trouble = ""
             started = time.perf_counter()
             with self._watchdog.frame():

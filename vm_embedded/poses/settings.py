@@ -7,7 +7,7 @@ from dataclasses import Field, dataclass
 from typing import Any
 
 from ..borders.sockets import parse_address
-from ..config.entries import check_entries, entry, number, one_of
+from ..config.entries import check_entries, entry, number, one_of, switch
 from ..config.units import angle
 from ..errors import InputError
 from ..geometry.orientation import Orientation
@@ -82,6 +82,10 @@ class PoseSettings:
     )
     add_roll: float = angle(0.0, "added to the roll of each pose, in radians or with deg", _ADDED)
     scale_height: float = number(1.0, "factor for the height of each pose", "", (0.5, 2.0))
+    correct: bool = switch(
+        False,
+        "slowly correct all poses by what lines and balls show, by at most 3 degrees and 10 %; messages say how much",
+    )
 
     def __post_init__(self) -> None:
         check_entries(self)
@@ -90,9 +94,4 @@ class PoseSettings:
         """A pose with the corrections. A fixed pose needs none."""
         if not (self.add_pitch or self.add_roll) and self.scale_height == 1.0:
             return orientation
-        return Orientation.from_roll_pitch(
-            orientation.height * self.scale_height,
-            orientation.roll + self.add_roll,
-            orientation.pitch + self.add_pitch,
-            orientation.yaw,
-        )
+        return orientation.adjusted(self.add_pitch, self.add_roll, self.scale_height)

@@ -95,6 +95,23 @@ def test_a_search_finds_an_error_that_is_too_large_for_the_check():
     assert found.pitch == pytest.approx(17.0, abs=5.0)
 
 
+def test_a_correction_slowly_takes_an_error_out():
+    seen, check = assumed(pitch=2.0), PoseCheck(corrects=True)
+    added = []
+    for each in 8 * seen:
+        pose = check.corrected(each.orientation)
+        added.append(check.update(detector().detect(each.image, pose, each.lens)).pose.added_pitch)
+    assert added[0] == 0.0
+    assert max(abs(np.diff(added))) < 0.3
+    assert added[-1] == pytest.approx(2.0, abs=0.5)
+    assert check.state.verdict == "consistent"
+    far = PoseCheck(corrects=True)
+    for each in 8 * assumed(pitch=6.0):
+        far.update(detector().detect(each.image, far.corrected(each.orientation), each.lens))
+    assert far.state.added_pitch == pytest.approx(3.0)
+    assert far.state.verdict == "wrong"
+
+
 def test_a_corrected_pose_keeps_its_yaw():
     pose = Orientation.from_roll_pitch(0.5, 0.1, 0.3, 2.0)
     better = corrected(pose, np.array([0.02, -0.01, math.log(1.1), 0.3]))
