@@ -62,6 +62,9 @@ _BETTER, _SURE = 1.15, 4.0
 SURE_BALLS = 2.0
 """Gain of balls from which they tell the height."""
 
+_CLEARLY = 1.25
+"""Factor by which another height must be better."""
+
 _OFF, _OFF_HEIGHT = math.radians(2.5), 0.12
 """Least errors of a pose that is wrong."""
 
@@ -140,8 +143,17 @@ class PoseSearch:
                 best = max(best, self.refined(each), key=lambda each: each.rank)
         if best is given:
             return given, given
-        scaled = [best, *(self.look(best.errors + _one(HEIGHT, each)) for each in HEIGHTS if each)]
-        return given, self.refined(max(scaled, key=lambda each: each.rank))
+        return given, self.refined(self._scaled(best))
+
+    def _scaled(self, best: Tried) -> Tried:
+        """A correction with the height that balls speak for; without balls, with the given one: lines fit at any."""
+        angles = best.errors.copy()
+        angles[HEIGHT] = 0.0
+        unscaled = self.look(angles)
+        others = [best, *(self.look(best.errors + _one(HEIGHT, each)) for each in HEIGHTS if each)]
+        scaled = max(others, key=lambda each: each.ball_gain)
+        is_clear = scaled.ball_gain > max(SURE_BALLS, _CLEARLY * unscaled.ball_gain + 1.0)
+        return scaled if is_clear else unscaled
 
     def refined(self, tried: Tried) -> Tried:
         """The best correction near one that was tried."""
