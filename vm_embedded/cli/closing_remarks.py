@@ -21,6 +21,13 @@ _RARE = 0.05
 """With a radius of the user's, share of frames with objects below which that radius is doubtful."""
 
 
+_SURE, _MOST = 0.9, 0.6
+"""With certain objects of the right size in most frames, no better pose is sought: their confidence, and the share of
+these frames."""
+
+_TILTED = 1.5
+"""Error of pitch or roll [deg] from which a wrong size of objects may come from the pose."""
+
 _VIEWS = 5
 """Frames that are kept to search for a better pose."""
 
@@ -37,6 +44,7 @@ class ClosingRemarks:
         self._has_peaks = bool(manifest.peaks)
         self._doubt = ""  # the first one about a lens
         self._frames = self._shown = self._found = 0  # frames, those with mesh points, those with objects
+        self._sure = 0  # frames with a certain object of the right size
         self._has_features = False  # whether a frame showed a feature of the field
         self._sizes: list[float] = []  # of the objects, relative to the expected size
         self._last: Detections | None = None
@@ -62,6 +70,7 @@ class ClosingRemarks:
         self._frames += 1
         self._shown += len(detections.pixels) > 0
         self._found += len(detections) > 0
+        self._sure += any(each.confidence > _SURE and each.distances_agree for each in detections)
         field = detections.field
         self._has_features = self._has_features or (field is not None and any(field.as_dict().values()))
         self._sizes += size_ratios(detections)
@@ -78,11 +87,11 @@ class ClosingRemarks:
         better one."""
         if self._doubt:
             yield self._doubt
-        about_pose = self._about_pose()
         # Without peaks, sizes are as coarse as the mesh.
         hint = size_hint(self._sizes, self._radius) if self._has_peaks else ""
-        if about_pose or hint:
-            yield about_pose or hint
+        remark = self._about_pose(hint)
+        if remark:
+            yield remark
         if self._frames and not self._shown:
             yield "no frame shows a near part of the plane: check --height [m], --pitch (down is above 0), and lens"
         if self._shown >= _SEVERAL and self._has_objects and self._finds_too_little():
@@ -92,9 +101,16 @@ class ClosingRemarks:
                 "lists what was rejected"
             )
 
-    def _about_pose(self) -> str:
+    def _about_pose(self, hint: str) -> str:
+        """A remark about the pose, or the hint about the size of the objects, which also shows a wrong height."""
         state = None if self._last is None else self._last.pose
-        return "" if state is None else pose_remark(with_search(state, self._detector, self._views), self._fixed)
+        if state is None:
+            return hint
+        is_plausible = state.verdict in ("unknown", "consistent") and self._sure > _MOST * self._frames
+        if not is_plausible:
+            state = with_search(state, self._detector, self._views)
+        is_tilted = any(abs(each or 0.0) > _TILTED for each in (state.pitch, state.roll))
+        return hint if hint and not is_tilted else pose_remark(state, self._fixed)
 
     def _finds_too_little(self) -> bool:
         """Whether nothing was found at all, or with a radius of the user's too few objects."""

@@ -135,7 +135,8 @@ class PoseSearch:
         some = self._views[:: -(-len(self._views) // _SOME_VIEWS)]
         starts = [self.look(np.array([pitch, 0.0, height, 0.0]), some) for height in heights for pitch in pitches]
         starts.sort(key=lambda each: each.rank, reverse=True)
-        if not starts[0].errors.any():  # the given poses: no other start is better
+        most_balls = max(each.ball_gain for each in starts)
+        if not starts[0].errors.any() and starts[0].ball_gain >= most_balls:  # the given poses: none is better
             return given, given
         best = given
         for each in starts[:_REFINED]:
