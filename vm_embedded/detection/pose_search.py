@@ -32,7 +32,7 @@ HEIGHTS = np.log([1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8]).tolist()
 _FEW_HEIGHTS = np.log([1.0, 0.7, 1.4, 0.5, 2.0]).tolist()
 """Those that are tried with each pitch."""
 
-_SOME_VIEWS = 2
+_SOME_VIEWS = 3
 """Frames that are looked at with each start."""
 
 _REFINED = 3
@@ -61,6 +61,9 @@ _BETTER, _SURE = 1.15, 4.0
 
 SURE_BALLS = 2.0
 """Gain of balls from which they tell the height."""
+
+_MORE_BALLS = 4.0
+"""Gain of balls that alone shows a better pose: lines may be many at a wrong height."""
 
 _CLEARLY = 1.25
 """Factor by which another height must be better."""
@@ -200,7 +203,8 @@ def with_search(state: PoseState, detector: Detector, views: Sequence[View]) -> 
     pitch, roll, height = found.total[:WIDTH].tolist()
     has_scale = found.ball_gain > max(SURE_BALLS, given.ball_gain + 1.0)
     is_off = max(abs(pitch), abs(roll)) > _OFF or (has_scale and abs(height) > _OFF_HEIGHT)
-    if not is_off or found.gain < given.gain * _BETTER + _SURE:
+    more_balls = found.ball_gain > given.ball_gain * _CLEARLY + _MORE_BALLS
+    if not is_off or not (more_balls or found.gain > given.gain * _BETTER + _SURE):
         return state
     return PoseState(
         verdict="wrong",
