@@ -320,7 +320,8 @@ def check_image(seen, objects, field, border):
         assert same(places([each.bb.center.position for each in messages]), of(things, "pixel"), 0.051)
         assert same(sure(messages), of(things, "confidence"))
     marks = seen.markings_in_image
-    assert same([places([each.start, each.end]) for each in marks.segments], of(field["lines"], "pixels"), 0.051)
+    ends = [each for each in of(field["lines"], "pixels") if None not in np.ravel(each)]
+    assert same([places([each.start, each.end]) for each in marks.segments], ends, 0.051)
     assert ["LTX"[each.num_rays - 2] for each in marks.intersections] == of(field["crossings"], "kind")
     assert same(places(seen.field_boundary_in_image.points), border, 0.051)
 

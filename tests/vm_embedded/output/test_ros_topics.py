@@ -110,6 +110,17 @@ def test_the_same_features_are_in_the_image(frame):
     assert boundary.header.frame_id == marks.header.frame_id == "eye"
 
 
+def test_a_line_with_an_end_outside_of_the_image_is_not_in_it():
+    _, found = demo_frame()
+    field = scene(found.observation.view)
+    outside = replace(field.lines[0], pixels=np.array([[10.0, 20.0], [np.nan, np.nan]]))
+    found = replace(found, field=replace(field, lines=(outside, *field.lines)))
+    headers = [header_of(TYPES, stamp_of(TYPES, 5.25), each) for each in ("eye", "ground")]
+    results = FrameResults(TYPES, *headers, found, Orientation.from_roll_pitch(0.6, 0.0, 0.3), OFFSET)
+    counts = {name: len(TOPICS[name][1](results).segments) for name in ("markings", "markings_in_image")}
+    assert counts == {"markings": len(field.lines) + 1, "markings_in_image": len(field.lines)}
+
+
 def test_markers_draw_each_thing_once(frame):
     found, made = frame
     markers, field = made["markers"].markers, found.field

@@ -163,7 +163,7 @@ def marking_array(frame: FrameResults, field: FieldFeatures) -> Any:
 
 @_of_field
 def markings_in_image(frame: FrameResults, field: FieldFeatures) -> Any:
-    """The same in 2D; the ellipse is around the visible part of the circle."""
+    """The same in 2D, of lines with both ends in the image; the ellipse is around the visible part of the circle."""
     types = frame.types
     return types.MarkingArray2D(
         header=frame.in_image,
@@ -176,6 +176,7 @@ def markings_in_image(frame: FrameResults, field: FieldFeatures) -> Any:
                 confidence=_confidence(types, each.confidence),
             )
             for each in field.lines
+            if not np.isnan(each.pixels).any()
         ],
     )
 
