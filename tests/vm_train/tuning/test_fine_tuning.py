@@ -97,6 +97,7 @@ def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_b
     lens = draw_set(tmp_path / "drawn", 1) / "lens0000.yaml"
     for image in seen.glob("*.jpg"):
         shutil.copy(lens, image.with_suffix(".yaml"))
+    (seen / "object.toml").write_text('shape = "sphere"\nradius = 0.11\n')
     done = tune(tmp_path / "run", "--set", "data.validation=0", "--set", "data.test=0", boxes=seen)
     lines = done.stdout.splitlines()
     assert re.match(
@@ -106,7 +107,7 @@ def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_b
     assert lines[7:] == [
         f"{model}: not measured, because no frames were held out",
         f"report: {tmp_path / 'run' / 'report.html'}",
-        f"next: vm-detect --model {model} {seen} --save-overlay found",
+        f"next: vm-detect --model {model} {seen} --object-radius 0.11 --save-overlay found",
     ]
     assert "nothing was measured" in (tmp_path / "run" / "report.html").read_text()
 
