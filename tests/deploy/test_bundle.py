@@ -94,7 +94,7 @@ def test_a_configuration_brings_its_model_and_its_lens(tmp_path):
     text = '# ours\nmodel = "ball-small"\nlens = "left.toml" # of the left eye\n\n[camera]\nsource = "0"\n'
     (tmp_path / "robot.toml").write_text(text)
     ran = bundle_command("--dist", tmp_path / "dist", "--config", tmp_path / "robot.toml")
-    assert ran.returncode == 0, ran.stderr
+    assert (ran.returncode, ran.stderr) == (0, "")
     (path,) = (tmp_path / "dist").iterdir()
     etc = unpacked(path, tmp_path / "unpacked") / "etc"
     table = tomllib.loads((etc / "vm.toml").read_text())
@@ -131,6 +131,7 @@ def test_a_lens_does_not_take_the_place_of_the_configuration(tmp_path):
     ran = bundle_command("--dist", tmp_path / "dist", "--config", tmp_path / "robot.toml")
     assert ran.returncode == 1
     assert "can't be called vm.toml" in ran.stderr
+    assert "[camera] source" in ran.stderr  # it names no camera, either
 
 
 def test_a_configuration_with_an_unknown_entry_is_refused(tmp_path):
