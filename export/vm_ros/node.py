@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats, Image
+from vm_embedded.borders.clock import wall_offset
 from vm_embedded.borders.credentials import without_password
 from vm_embedded.cameras.camera import CameraSettings
 from vm_embedded.cameras.open_camera import ROS, Opener, camera_opener
@@ -128,7 +129,7 @@ class Node:
         if isinstance(shot, RosShot):
             stamp, frame_id = shot.stamp, shot.frame_id
         else:
-            stamp = stamp_of(types, shot.captured + time.time() - time.monotonic())
+            stamp = stamp_of(types, shot.captured + wall_offset())
             frame_id = self._camera_frame
         detections = answer.detections
         try:

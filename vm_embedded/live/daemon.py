@@ -18,6 +18,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Protocol
 
+from ..borders.clock import wall_offset
 from ..borders.credentials import without_password
 from ..borders.sockets import is_open_to_network
 from ..borders.text import to_json
@@ -203,7 +204,7 @@ class Daemon:
             self._log("status page", url=f"http://{status.page}/", token=self.page.token)
             if self.page.not_kept:
                 self._log("the next start will have another token", "warning", reason=self.page.not_kept)
-        self._clock_offset = _clock_offset()
+        self._clock_offset = wall_offset()
 
     async def _open(self, part: Part) -> None:
         """Open a part; wait some seconds for the network if that needs it. Raises InputError."""
@@ -257,7 +258,7 @@ class Daemon:
         self._stuck = "" if self._stops else self._grabber.stuck
 
     def _log_clock_jump(self) -> None:
-        jump = _clock_offset() - self._clock_offset
+        jump = wall_offset() - self._clock_offset
         if abs(jump) > _CLOCK_JUMP:
             self._log("clock jumped", "warning", seconds=round(jump, 3))
             self._clock_offset += jump
@@ -381,8 +382,3 @@ class Daemon:
         await self._recorder.close(_RECORDING_S)
         self._grabber.stop(0.3)
         self._notifier.close()
-
-
-def _clock_offset() -> float:
-    """The wall clock relative to the monotonic clock [s]."""
-    return time.time() - time.monotonic()

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
+from ..borders.clock import wall_offset
 from ..borders.records import SIZE, Record, Sent
 from ..cameras.camera import Shot
 from ..cameras.frame_source import Frame
@@ -131,7 +132,7 @@ def live_frame(number: int, state: str, shot: Shot, detections: Detections, now:
         state=state,
         frame=number,
         t=shot.captured,
-        wall=time.time() - (time.monotonic() - shot.captured),
+        wall=shot.captured + wall_offset(),
         age_ms=1e3 * (now - shot.captured),
         latency_ms=1e3 * (now - shot.arrived),
         truth=shot.truth or None,

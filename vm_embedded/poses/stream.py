@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
+from ..borders.clock import wall_offset
 from ..borders.sockets import Acceptor, Connections, UnixListener, datagram_socket, parse_address
 from ..errors import InputError, VisualMeshError
 from ..geometry.orientation import Orientation
@@ -141,7 +142,7 @@ class PoseStream:
         if self.settings.clock == "arrival" or t is None:
             return now - 1e-3 * self.settings.latency_ms
         if self.settings.clock == "wall":
-            t += time.monotonic() - time.time()  # read together: `now` is from before the parsing
+            t -= wall_offset()
         if not now - _OLDEST < t < now + _EARLY:
             raise InputError(
                 f"t of the pose is {t - now:+.3g} s from now on the {self.settings.clock} clock; "

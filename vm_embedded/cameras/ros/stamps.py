@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-import time
+import math
 from typing import Any
+
+from ...borders.clock import wall_offset
 
 _JUMP = 1.0
 """Change between the clock of the stamps and the own clock [s] after which the stamps start anew, as in a bag that is
 played again."""
+
+_DRIFT = 1e-3
+"""Change between the wall clock and the monotonic clock [s] that the stamps follow. Below it, equal stamps keep equal
+times: an image and its pose, which arrive one after the other, belong together."""
 
 
 def seconds_of(stamp: Any) -> float:
@@ -30,14 +36,17 @@ class StampClock:
 
     def __init__(self, clock: str) -> None:
         self._wall = clock == "wall"
-        self._offset: float | None = None
+        self._offset = math.nan
 
     def monotonic(self, seconds: float, now: float) -> float:
         """The monotonic time of a stamp of a message that arrives at `now`, both in seconds."""
         if self._wall:
-            return seconds + (time.monotonic() - time.time())
-        offset = now - seconds
-        if self._offset is None or abs(offset - self._offset) > _JUMP:
-            self._offset = offset
-        self._offset = min(self._offset, offset)
+            self._follow(-wall_offset(), _DRIFT)
+        else:
+            self._follow(now - seconds, _JUMP)
+            self._offset = min(self._offset, now - seconds)
         return seconds + self._offset
+
+    def _follow(self, offset: float, jump: float) -> None:
+        if not abs(offset - self._offset) <= jump:  # nan at first
+            self._offset = offset
