@@ -62,6 +62,8 @@ class CanvasShape:
         """Multiplications and additions for each cell, without activations."""
         widths, depths = self.widths, self.depths
         total = 9.0 * 4 * widths[0] + widths[0] * self.outputs
+        if self.peaks:
+            total += widths[0] * (9 + widths[0])
         for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
             share = 0.25**level
             separable = width * (9 + width)
