@@ -126,6 +126,8 @@ def judge_peaks(
     explain: also the rejected ones, with their reasons. watch: gets the stages propose, and with a look look. Raises
     ModelError if a look network does not run.
     """
+    if not sought:
+        return []
     pairs = [(each, each.best) for each in sought]
     centers = [each.view.shape.center_along(peaks.rays, each.view.height) for each, peaks in pairs]
     watch.lap("propose")
