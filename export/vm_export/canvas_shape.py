@@ -9,7 +9,7 @@ from typing import Any
 from vm_embedded.errors import InputError
 from vm_embedded.network.manifest import PEAK_OUTPUTS
 
-COARSER = ((1.5, 1), (2.0, 2), (3.0, 2))
+COARSER = ((2.0, 1), (4.0, 2), (6.0, 2))
 """Of each coarser canvas: its channels, as a multiple of those of the finest one, and its separable convolutions."""
 
 _BLOCK = 8
