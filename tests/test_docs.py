@@ -125,6 +125,7 @@ def test_the_python_of_the_pages_has_right_types(tmp_path):
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.long
 def test_another_language_reads_the_lines_of_json(tmp_path):
     """The program for Node.js of the recipes, behind vm-detect."""
     node = shutil.which("node")
@@ -243,6 +244,7 @@ def test_targets_of_make_exist(page):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), f"{name_of(page)} names make {target}"
 
 
+@pytest.mark.long
 def test_the_site_builds_without_warnings_and_needs_no_network(tmp_path):
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", DOCS / "site" / "mkdocs.yml"]
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "PATH": ""}

@@ -71,6 +71,7 @@ def test_a_camera_that_stands_still(tmp_path):
     assert speed == pytest.approx(np.linalg.norm(Motion(0.0).ball(0.95) - Motion(0.0).ball(0.85)) / 0.1, abs=0.3)
 
 
+@pytest.mark.long
 def test_poses_over_udp(tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))

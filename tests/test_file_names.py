@@ -80,6 +80,7 @@ def test_an_image_of_any_name_gives_a_line_with_its_name_escaped(tmp_path, frame
         assert line["detections"]
 
 
+@pytest.mark.long
 def test_every_file_that_is_saved_has_the_name_that_was_given(tmp_path, frames):
     saved = {
         "--save-overlay": b"o\xe4",
@@ -112,12 +113,14 @@ def test_a_film_is_read_as_a_whole_from_a_folder_of_any_name(tmp_path, frames):
     assert (frames / "-o.webm").stat().st_size
 
 
+@pytest.mark.long
 def test_a_file_is_never_taken_for_a_sequence_of_images(tmp_path):
     for name in ("s%d.jp2", "s1.jp2", "s2.jp2", "s3.jp2"):
         cv2.imwrite(str(tmp_path / name), cv2.imread(str(IMAGES[0])))
     assert len(lines(detect("s%d.jp2", "--lens", LENS, cwd=tmp_path))) == 1
 
 
+@pytest.mark.long
 def test_a_terminal_of_ascii_gets_escapes(tmp_path):
     shutil.copy(IMAGES[0], tmp_path / "Bälle.jpg")
     for more in ({"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, {"PYTHONIOENCODING": "ascii"}):
@@ -135,6 +138,7 @@ def test_an_address_that_is_not_utf_8_is_an_error_of_the_configuration(tmp_path,
     detect("--camera", address, "--lens", LENS, cwd=tmp_path, code=78)
 
 
+@pytest.mark.long
 def test_a_daemon_plays_files_of_any_name_and_writes_to_files_of_any_name(tmp_path):
     film(named(tmp_path, b"f\xeflm.avi"), tmp_path, 8)
     options = (
@@ -155,11 +159,13 @@ def test_a_configuration_is_not_printed_with_another_name(tmp_path):
     assert detect("--print-config", "--lens", b"l\xe4ns.yaml", cwd=tmp_path, code=1) == ""
 
 
+@pytest.mark.long
 def test_vm_doctor_shows_a_name_escaped(tmp_path, frames):
     found = lines(run("vm-doctor", "--model", MODEL, "--camera", b"t\xfcr", "--json", cwd=tmp_path))
     assert any("t\\udcfcr" in each["seen"] for each in found)
 
 
+@pytest.mark.long
 def test_vm_calibrate_reads_a_film_of_any_name(tmp_path):
     film(named(tmp_path, b"f\xeflm.avi"), tmp_path)
     printed = run("vm-calibrate", "lens", b"f\xeflm.avi", "--board", "9x6", "-o", b"l\xe4ns.yaml", cwd=tmp_path, code=1)
@@ -217,6 +223,7 @@ def test_files_whose_names_have_colons_are_files(tmp_path):
         assert not is_live(str(tmp_path / name))
 
 
+@pytest.mark.long
 def test_a_path_that_looks_like_an_address_is_a_path(tmp_path):
     (tmp_path / "http:/b").mkdir(parents=True)
     film(tmp_path / "http:/b/film.avi", tmp_path)
@@ -237,6 +244,7 @@ FORMS = [("NFC", "NFD"), ("NFD", "NFC")]
 CAFE = "Café Ångström 한글"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("written", "typed"), FORMS)
 def test_a_name_in_another_unicode_form_is_the_same_name(written, typed, tmp_path):
     there, here = (normalize(each, CAFE) for each in (written, typed))

@@ -89,6 +89,7 @@ def folder(tmp_path_factory):
     return made
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("row", READ.splitlines(), ids=lambda row: " ".join(row.split()))
 def test_a_named_pipe_in_place_of_a_file_is_named_and_not_waited_for(row, folder):
     name, command = row.split(maxsplit=1)

@@ -122,6 +122,7 @@ def test_the_authors_network_finds_the_balls(shared, model, options):
     assert np.median(errors) < 0.03
 
 
+@pytest.mark.long
 def test_every_frame_of_the_real_cameras_is_processed(shared, model, tmp_path):
     overlay = ("--save-overlay", tmp_path)
     out = run("vm-detect", "--camera", shared / "real/images", "--model", model, "--object-radius", 0.11, *overlay)

@@ -47,6 +47,7 @@ def test_a_network_runs_and_matches_its_card(name):
         assert (TOP / recipe).exists()
 
 
+@pytest.mark.long
 def test_without_a_name_the_default_is_used():
     image = min(DEMO.glob("image*.jpg"))
     given = [detect("--camera", image), detect("--camera", image, "--model", DEFAULT)]

@@ -325,16 +325,24 @@ def locked_folder(folder: Path, patience: float = 0.0) -> Iterator[None]:
 
 def _lock(folder: Path, deadline: float) -> int:
     """A descriptor that holds the lock of a folder until it is closed."""
+    was_there = False
     while True:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # The folder may have been removed since it was opened, and another one may have its name.
-            if os.path.samestat(os.fstat(descriptor), folder.lstat()):
-                return descriptor
-            os.close(descriptor)
-        except OSError as error:
-            os.close(descriptor)
-            if not isinstance(error, BlockingIOError) or time.monotonic() >= deadline:
+            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+        except FileNotFoundError:
+            # A folder that was there is missing for a moment if another one takes its name.
+            if not was_there or time.monotonic() >= deadline:
                 raise
+        else:
+            was_there = True
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # The folder may have been removed since it was opened, and another one may have its name.
+                if os.path.samestat(os.fstat(descriptor), folder.lstat()):
+                    return descriptor
+                os.close(descriptor)
+            except OSError as error:
+                os.close(descriptor)
+                if not isinstance(error, BlockingIOError | FileNotFoundError) or time.monotonic() >= deadline:
+                    raise
         time.sleep(_PAUSE)

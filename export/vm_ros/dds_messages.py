@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +12,7 @@ from cyclonedds.idl import types as idl
 from vm_embedded.cameras.ros.message_fields import FIELDS, fields_of, short_name
 
 from .cdr import encode
+from .plain_messages import with_arrays
 
 _PRIMITIVES: dict[str, Any] = {
     "bool": bool,
@@ -25,9 +25,6 @@ _PRIMITIVES: dict[str, Any] = {
     "string": str,
 }
 
-_LEVELS = {"OK": 0, "WARN": 1, "ERROR": 2}
-"""Constants of DiagnosticStatus."""
-
 
 def message_classes() -> SimpleNamespace:
     """The classes of all messages by their short names, and functions that make their arrays."""
@@ -35,13 +32,7 @@ def message_classes() -> SimpleNamespace:
     for full in FIELDS:
         package, _, name = full.split("/")
         classes[short_name(full)] = _message_class(full, f"{package}::msg::dds_::{name}_", classes)
-    for name, level in _LEVELS.items():
-        setattr(classes["DiagnosticStatus"], name, level)
-    return SimpleNamespace(**classes, octets=bytes, doubles=_doubles)
-
-
-def _doubles(numbers: Sequence[float]) -> list[float]:
-    return [float(each) for each in numbers]
+    return with_arrays(classes)
 
 
 def _message_class(full: str, dds_name: str, classes: dict[str, Any]) -> Any:

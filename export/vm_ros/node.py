@@ -1,7 +1,7 @@
 """The node: images, lenses and poses of ROS go to the daemon, its detections and states go to ROS.
 
 Messages arrive in the thread of the middleware. Poses are handed to the event loop; images wait for the thread that
-reads the camera.
+reads the camera. Arrays of detections leave in a thread of their own.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
 
@@ -70,6 +71,8 @@ class Node:
         self._image_time = -np.inf
         self._reported = ("", -np.inf)  # state, and when it was published
         self._drawing: asyncio.Task[None] | None = None
+        self._sender = ThreadPoolExecutor(1, "publish")
+        self._sent: Future[None] | None = None
         prefix = self._ros.namespace.rstrip("/")
         self._publishers = [
             (middleware.publisher(f"{prefix}/{name}", message), make)
@@ -111,9 +114,14 @@ class Node:
 
     async def close(self) -> None:
         """Disconnect."""
-        if self._drawing is not None:
-            await self._drawing
-        await asyncio.to_thread(self._middleware.close)
+        try:
+            if self._drawing is not None:
+                await self._drawing
+            if self._sent is not None:
+                await asyncio.wrap_future(self._sent)
+        finally:
+            self._sender.shutdown()
+            await asyncio.to_thread(self._middleware.close)
 
     def publish(self, message: Message, answer: Answer | None) -> None:
         """Publish what a frame shows, and at each change and once per second the state. No frame, no arrays."""
@@ -139,12 +147,19 @@ class Node:
             return
         in_image, on_plane = (header_of(types, stamp, each) for each in (frame_id, self._ros.plane_frame))
         frame = FrameResults(types, in_image, on_plane, detections, answer.orientation, offset)
+        sent, self._sent = self._sent, None
+        if sent is not None:
+            sent.result()  # no more than a frame waits for slow readers, and no error is lost
+        self._sent = self._sender.submit(self._send, frame)
+        if (self._debug_image.readers or self._map.readers) and (self._drawing is None or self._drawing.done()):
+            self._drawing = asyncio.ensure_future(asyncio.to_thread(self._publish_drawings, frame, shot.image))
+
+    def _send(self, frame: FrameResults) -> None:
+        """Publish the arrays of a frame: half a millisecond for each topic that is read, so not in the event loop."""
         for publisher, make in self._publishers:
             message = make(frame) if publisher.readers else None
             if message is not None:
                 publisher.publish(message)
-        if (self._debug_image.readers or self._map.readers) and (self._drawing is None or self._drawing.done()):
-            self._drawing = asyncio.ensure_future(asyncio.to_thread(self._publish_drawings, frame, shot.image))
 
     def _publish_drawings(self, frame: FrameResults, image: Image) -> None:
         if self._debug_image.readers:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import threading
-from array import array
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
-from types import SimpleNamespace
 from typing import Any
 
 import rclpy
@@ -19,7 +17,9 @@ from rclpy.signals import SignalHandlerOptions
 from vm_embedded.cameras.ros.message_fields import FIELDS, MESSAGES, short_name
 from vm_embedded.errors import InputError, one_line
 
+from .cdr import encode
 from .middleware import DETECTIONS, FIXED_TRANSFORMS, POSES, SENSOR, TRANSFORMS
+from .plain_messages import plain_classes
 
 _PROFILES = {
     SENSOR: QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
@@ -36,11 +36,14 @@ _OWN_PARAMETERS = ("use_sim_time", "start_type_description_service")
 
 
 class RclpyPublisher:
-    """A publisher of rclpy."""
+    """A publisher of rclpy for messages with a short name."""
 
-    def __init__(self, publisher: Any) -> None:
-        self.publish = publisher.publish
-        self._publisher = publisher
+    def __init__(self, publisher: Any, message: str) -> None:
+        self._publisher, self._message = publisher, message
+
+    def publish(self, message: Any) -> None:
+        """Send a message."""
+        self._publisher.publish(encode(self._message, message))
 
     @property
     def readers(self) -> int:
@@ -52,7 +55,8 @@ class RclpyMiddleware:
     """A node of rclpy, which a thread spins. Raises InputError for wrong arguments."""
 
     def __init__(self, name: str, arguments: Sequence[str]) -> None:
-        self.types, self._missing = message_classes()
+        self._classes, self._missing = message_classes()
+        self.types = plain_classes(self._classes)
         # The daemon handles signals.
         try:
             rclpy.init(args=["--ros-args", *arguments], signal_handler_options=SignalHandlerOptions.NO)
@@ -81,13 +85,13 @@ class RclpyMiddleware:
 
     def publisher(self, topic: str, message: str, kind: str = DETECTIONS) -> RclpyPublisher:
         """A publisher of messages with a short name. Raises InputError without its package."""
-        return RclpyPublisher(self._node.create_publisher(self._class(message), topic, _PROFILES[kind]))
+        return RclpyPublisher(self._node.create_publisher(self._class(message), topic, _PROFILES[kind]), message)
 
     def _class(self, message: str) -> Any:
-        if not hasattr(self.types, message):
+        if message not in self._classes:
             package = MESSAGES[message].split("/")[0]
             raise InputError(f"ROS lacks the messages {message}: {_install([package])}")
-        return getattr(self.types, message)
+        return self._classes[message]
 
     def start(self) -> None:
         """Begin to receive."""
@@ -106,8 +110,8 @@ class RclpyMiddleware:
         rclpy.try_shutdown()
 
 
-def message_classes() -> tuple[SimpleNamespace, list[str]]:
-    """The classes of all messages whose packages are installed, and the names of the other packages."""
+def message_classes() -> tuple[dict[str, Any], list[str]]:
+    """The classes of all messages whose packages are installed, by short name, and the names of the other packages."""
     classes, missing = {}, set[str]()
     for full in FIELDS:
         package, _, name = full.split("/")
@@ -115,7 +119,7 @@ def message_classes() -> tuple[SimpleNamespace, list[str]]:
             classes[short_name(full)] = getattr(import_module(f"{package}.msg"), name)
         except ImportError:
             missing.add(package)
-    return SimpleNamespace(**classes, octets=lambda content: array("B", content), doubles=list), sorted(missing)
+    return classes, sorted(missing)
 
 
 def _install(packages: Sequence[str]) -> str:

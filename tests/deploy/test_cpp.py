@@ -134,6 +134,7 @@ def test_it_decodes_the_numbers_of_the_json(dump, messages):
             np.testing.assert_allclose(float(found), value, rtol=tolerance, err_msg=line)
 
 
+@pytest.mark.long
 @settings(max_examples=60)
 @given(st.data())
 def test_damaged_messages_are_errors_and_touch_no_foreign_memory(dump, messages, data):
@@ -179,6 +180,7 @@ def hostile(message):
     yield "an unknown state", changed(body, state=LARGEST)
 
 
+@pytest.mark.long
 def test_a_message_that_does_not_fit_its_header_is_refused(dump, messages):
     """Each is alone in memory of its size, so that the checks of the compiler find any read beyond its end."""
     cases = [each for message in (messages[2], messages[-2], messages[-1]) for each in hostile(message)]
@@ -292,6 +294,7 @@ def test_a_behavior_goes_on_while_the_detector_hangs_dies_and_comes_back(compile
             robot.wait_for("walk: ")
 
 
+@pytest.mark.long
 def test_a_behavior_survives_what_is_no_detector(compiled, tmp_path, messages):
     path = tmp_path / "lines"
     whole = to_binary(state_message("pose_stale", "no pose received yet"))

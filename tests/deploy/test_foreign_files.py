@@ -100,6 +100,7 @@ def test_a_folder_of_wheels_that_it_has_not_made_is_refused(tmp_path):
     assert contents(tmp_path) == before
 
 
+@pytest.mark.long
 def test_a_download_that_fails_leaves_the_former_one_and_other_folders(tmp_path):
     for name in (f"{TARGET}/lock", f".{TARGET}.part/own.txt"):
         (tmp_path / name).parent.mkdir()

@@ -9,6 +9,8 @@ import pytest
 from .bundles import CHECKOUT
 from .prefixes import Prefix
 
+pytestmark = pytest.mark.long
+
 MODELS = {name: CHECKOUT / "vm_embedded" / "models" / f"{name}.onnx" for name in ("ball", "ball-small", "soccer")}
 
 

@@ -15,6 +15,8 @@ from tests.messages import read_message
 from .bundles import CHECKOUT, changed
 from .prefixes import Prefix
 
+pytestmark = pytest.mark.long
+
 LARGEST = 301
 """Of the installation [MiB]."""
 
@@ -101,7 +103,6 @@ def started(command):
             assert process.wait(10.0) == 0
 
 
-@pytest.mark.long
 def test_without_systemd_it_says_how_to_start_it_and_when_to_restart_it(bundle, tmp_path):
     """As a user types it: no command before it cuts it off from this machine, where the detector runs."""
     here = Prefix(tmp_path / "prefix", [])
@@ -132,7 +133,6 @@ def test_without_systemd_it_says_how_to_start_it_and_when_to_restart_it(bundle, 
     assert "--output-unix" in taken.stderr
 
 
-@pytest.mark.long
 def test_an_upgrade_keeps_what_the_robot_has_changed_and_goes_back(prefix, bundle, tmp_path):
     used = prefix.path / "current" / "etc" / "vm.toml"
     used.write_text(used.read_text().replace("threshold = 0.5", "threshold = 0.6"))
@@ -242,7 +242,6 @@ def test_unknown_words_are_wrong_usage(prefix, bundle):
     assert prefix.deploy().returncode == 2
 
 
-@pytest.mark.long
 def test_everybody_reads_what_only_root_changes(bundle, alone, tmp_path):
     other = Prefix(tmp_path / "prefix", [])
     careful = changed(bundle, tmp_path / "careful", "1-careful")
@@ -258,7 +257,6 @@ def test_everybody_reads_what_only_root_changes(bundle, alone, tmp_path):
     assert (other.path / ".lock").stat().st_mode & 0o077 == 0
 
 
-@pytest.mark.long
 def test_removed_it_leaves_its_configuration_for_the_next(bundle, alone, tmp_path):
     other = Prefix(tmp_path / "prefix", alone)
     assert other.install(changed(bundle, tmp_path / "a", "1-a")).returncode == 0

@@ -13,6 +13,8 @@ import pytest
 
 from .bundles import CHECKOUT
 
+pytestmark = pytest.mark.long
+
 URL = "https://code.example.org/robots/vm-embedded"
 IDENTITY = {f"GIT_{who}_{what}": "a@b.example" for who in ("AUTHOR", "COMMITTER") for what in ("NAME", "EMAIL")}
 LARGEST_WHEEL = 6_000_000
@@ -97,7 +99,6 @@ def test_the_wheel_is_complete_and_small_and_its_page_has_pictures(clone, releas
     assert all(each.startswith("http") for each in links), links
 
 
-@pytest.mark.long
 def test_the_source_distribution_runs_its_tests(released, tmp_path):
     with tarfile.open(released / "vm_embedded-9.8.7.tar.gz") as tar:
         tar.extractall(tmp_path, filter="data")

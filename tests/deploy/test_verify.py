@@ -11,6 +11,8 @@ import pytest
 from .bundles import CHECKOUT, bundle_command, changed, list_again, packed, signed, unpacked
 from .prefixes import Prefix
 
+pytestmark = pytest.mark.long
+
 NEW, OLD = "2026-03-01T00:00:00Z", "2026-02-28T23:59:59Z"
 
 
@@ -224,7 +226,6 @@ def test_attack_11_with_a_key_only_signed_bundles_are_accepted(prefix, keys, att
     assert "not signed by [deploy] signer" in ran.stderr
 
 
-@pytest.mark.long
 def test_make_bundle_signs(bundle, keys, prefix):
     ran = bundle_command("--dist", keys / "dist", "--key", keys / "key")
     assert ran.returncode == 0, ran.stderr
@@ -255,7 +256,6 @@ def test_attack_11_an_older_bundle_needs_the_option(prefix, small, tmp_path):
         assert ran.returncode == 0, ran.stderr
 
 
-@pytest.mark.long
 def test_attack_11_with_a_key_only_signed_models_that_are_not_older_are_accepted(prefix, keys):
     model, used = keys / "new.onnx", prefix.path / "current" / "etc" / "model.onnx"
     first, second = used.read_bytes(), (CHECKOUT / "vm_embedded" / "models" / "ball-small.onnx").read_bytes()
@@ -295,7 +295,6 @@ def test_attack_11_with_a_key_only_signed_models_that_are_not_older_are_accepted
     assert used.read_bytes() == first
 
 
-@pytest.mark.long
 def test_a_signed_bundle_is_unpacked_checked_and_installed_by_the_release_in_use(prefix, bundle, keys):
     whole = signed(changed(bundle, keys / "whole", "4-whole", time=NEW), keys / "key")
     ran = prefix.deploy("install", packed(whole))

@@ -71,11 +71,11 @@ def _refused_unless(is_good: bool) -> Iterator[None]:
 
 
 def _spelled(data: bytes) -> str:
+    """The name of an input. Both halves of a surrogate pair are one character, which JSON makes of them, too."""
     text = data.decode("utf-8", "surrogateescape")
-    try:
-        return str(json.loads(f'"{text}"'))
-    except ValueError:
-        return text
+    with suppress(ValueError):
+        text = str(json.loads(f'"{text}"'))
+    return text.encode("utf-16", "surrogatepass").decode("utf-16", "surrogatepass")
 
 
 def _entry(value: int) -> dict[str, Any]:

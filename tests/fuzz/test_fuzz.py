@@ -33,6 +33,7 @@ def test_inputs_made_from_the_corpus_are_read_or_refused_in_a_line(target, tmp_p
     assert report.inputs >= runs
 
 
+@pytest.mark.long
 def test_requests_to_the_page_leave_nothing_behind():
     """The fuzzed process can't show it: there, atheris keeps something for each request."""
     run = importlib.import_module("tests.fuzz.web").run

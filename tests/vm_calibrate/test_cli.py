@@ -24,6 +24,7 @@ def call(*arguments, **variables):
     )
 
 
+@pytest.mark.long
 def test_help_and_unknown_commands_as_a_process():
     listed = call("--help")
     assert listed.returncode == 0

@@ -40,6 +40,7 @@ def folders(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_lens_of_pictures_is_found(kind, folders, tmp_path, capsys):
     printed = run(capsys, "lens", folders(kind), *BOARD, "--lens", kind, "-o", tmp_path / "lens.yaml")
@@ -62,6 +63,7 @@ def test_the_kind_of_lens_is_chosen(folders, tmp_path, capsys):
         check(lens, LENSES[kind])
 
 
+@pytest.mark.long
 def test_a_charuco_video(tmp_path, capsys):
     camera = film("rectilinear")
     pictures = camera.pictures(15, charuco_texture())
@@ -80,6 +82,7 @@ def test_a_charuco_video(tmp_path, capsys):
     assert "1 without the board" in printed
 
 
+@pytest.mark.long
 def test_blurred_and_broken_frames_are_left_out(tmp_path):
     sharp = film("rectilinear").pictures(9, chessboard_texture())[6:]
     smeared = cv2.filter2D(sharp[0], -1, np.full((1, 7), 1 / 7, np.float32))

@@ -117,6 +117,7 @@ def test_the_true_pose_is_within_the_stated_uncertainty(lens, pitch, roll, box, 
     assert not fit.left_out
 
 
+@pytest.mark.long
 @settings(max_examples=5)
 @given(seed=seeds)
 def test_balls_that_are_not_on_the_floor_are_left_out(seed):
@@ -129,6 +130,7 @@ def test_balls_that_are_not_on_the_floor_are_left_out(seed):
     check(fit.orientation, CAMERA)
 
 
+@pytest.mark.long
 def test_of_many_balls_a_twentieth_is_left_out_before_the_next_fit(monkeypatch):
     balls = seen_balls(LENSES["equidistant"], CAMERA, np.random.default_rng(2), each=4)[:60]
     hidden = sorted(range(60), key=lambda at: -balls[at].size)[:18:3]
@@ -168,6 +170,7 @@ def test_too_few_balls_are_an_error():
         fit_balls(balls, LENSES["equisolid"], SIZE)
 
 
+@pytest.mark.long
 def test_balls_at_the_edge_of_the_picture_are_left_out():
     balls = seen_balls(LENSES["equisolid"], CAMERA, np.random.default_rng(1))
     cut = SeenBall("cut", RADIUS, np.array([10.0, 200.0, 40.0]))

@@ -229,7 +229,7 @@ def test_lines_of_a_text_end_with_a_line_feed(tmp_path, written):
 
 
 def test_the_lock_of_a_folder_is_that_of_the_folder_that_has_the_name(tmp_path):
-    """Another folder may have got the name since the lock was waited for."""
+    """Another folder may have got the name since the lock was waited for, some time after the first one lost it."""
     folder, names = tmp_path / "folder", []
     folder.mkdir()
     (folder / "old").touch()
@@ -245,6 +245,7 @@ def test_the_lock_of_a_folder_is_that_of_the_folder_that_has_the_name(tmp_path):
         waiting.start()
         time.sleep(0.05)
         folder.rename(tmp_path / "gone")
+        time.sleep(0.05)
         folder.mkdir()
         (folder / "new").touch()
     waiting.join()

@@ -12,6 +12,7 @@ from vm_export.canvas_shape import CanvasShape
 from vm_export.change_model import change_confidence
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("changes", [{"class1": (2.0, 0.5)}, {"class0": (0.3, -1.0), "class1": (1.0, 4.0)}])
 def test_only_the_scores_of_a_class_change(changes, tmp_path):
     export.export(checkpoint(4, CanvasShape(1, 8, 3, 2), "octaves"), tmp_path / "model.onnx")

@@ -67,6 +67,7 @@ def test_pictures_that_can_not_be_a_canary_are_refused(tmp_path):
     assert not output.exists()
 
 
+@pytest.mark.long
 def test_a_look_that_finds_no_canary_gives_a_file_without_one_and_a_warning(tmp_path):
     look = look_checkpoint()
     with torch.no_grad():

@@ -159,6 +159,7 @@ def test_what_is_off_screen_is_as_if_it_were_not_in_the_mesh():
         session.run(layout, one, shown)
 
 
+@pytest.mark.long
 def test_an_exported_network_detects_with_the_whole_mesh(tmp_path):
     """From a file, through the detector's cache, every answered point on screen gets probabilities."""
     from vm_embedded import Detector

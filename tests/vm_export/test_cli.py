@@ -142,6 +142,7 @@ def test_command_says_in_one_line_what_is_wrong(tmp_path, arguments, message):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.pt"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("missing", ["torch", "onnx", "yaml"])
 def test_command_without_its_extra_says_what_to_install(missing, tmp_path):
     program = f"import sys; sys.modules['{missing}'] = None; from vm_export.cli import main; sys.exit(main(['m.yaml']))"

@@ -133,6 +133,7 @@ def test_a_layout_that_there_is_not_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 @in_all_layouts
 def test_the_same_checkpoint_gives_the_same_bytes(layout, tmp_path):
     for name in ("a", "b"):
@@ -140,6 +141,7 @@ def test_the_same_checkpoint_gives_the_same_bytes(layout, tmp_path):
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
+@pytest.mark.long
 @in_all_layouts
 def test_a_graph_that_differs_from_torch_is_not_written(layout, tmp_path, monkeypatch):
     mesh = MESHES[layout]

@@ -51,6 +51,7 @@ def test_command_attaches_a_look_to_a_network_of_the_reference(folder):
     assert has_look(folder / "model.onnx")
 
 
+@pytest.mark.long
 def test_command_takes_the_looks_of_a_network_of_the_package(folder):
     reference_file(folder / "model.yaml")
     done = run(folder / "model.yaml", "--look", "soccer", "--classes", "ball:object,goal:upright")

@@ -26,6 +26,7 @@ def test_the_network_is_sure_of_each_class_and_unsure_between_classes():
     assert (np.abs(found - 0.5) < 0.2).any(axis=0).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("layout", "mesh"),
     [("plain", "ring4"), ("runs", "ring8"), ("runs", "xygrid6"), ("plain", "cap6"), ("canvas", "octaves")],

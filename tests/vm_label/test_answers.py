@@ -42,6 +42,7 @@ def test_the_last_answer_counts_and_a_torn_line_costs_only_itself(before, after,
         assert len(faults) == (torn > 0)
 
 
+@pytest.mark.long
 @given(GIVEN)
 def test_answers_are_in_the_order_of_the_newest(given):
     with tempfile.TemporaryDirectory() as name:

@@ -151,6 +151,7 @@ def test_training_data_that_can_not_be_written_leaves_nothing(tmp_path):
     assert "can't write" in run(source, "--write", tmp_path / "loop", code=1).stderr
 
 
+@pytest.mark.long
 def test_of_two_that_write_the_same_training_data_at_once_one_wins(tmp_path):
     source = make_folder(tmp_path / "boxes", 30, near=False)
     judge(source, ["yes"] * 30)

@@ -105,6 +105,7 @@ def test_200_crops_judged_by_keys_survive_a_reload_and_a_killed_server(tmp_path,
     assert faults == []
 
 
+@pytest.mark.long
 def test_undo_selection_and_the_whole_picture(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 6, near=False)
     crops = most_doubtful_first(read_box_folder(folder).crops)
@@ -139,6 +140,7 @@ def test_undo_selection_and_the_whole_picture(tmp_path, browser):
     assert "left out: 5 images with unanswered crops" in out
 
 
+@pytest.mark.long
 def test_a_reload_without_a_server_loses_nothing(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 4, near=False)
     with serving(folder) as (_, address):
@@ -203,6 +205,7 @@ def test_missed_objects_are_drawn_or_clicked_and_pictures_without_any_are_answer
     assert (tmp_path / "out" / "image0003.txt").read_text() == ""
 
 
+@pytest.mark.long
 def test_a_better_box_replaces_a_bad_one(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 1, near=False)
     x, y, width, height = read_box_folder(folder).crops[0].shares
@@ -220,6 +223,7 @@ def test_a_better_box_replaces_a_bad_one(tmp_path, browser):
     assert "boxes: 1 ball" in run(folder, "--write", tmp_path / "out").stdout
 
 
+@pytest.mark.long
 def test_two_pages_show_what_either_draws_and_a_lost_connection_keeps_drawn_boxes(tmp_path, browser):
     folder = make_folder(tmp_path / "boxes", 2, near=False)
     with serving(folder) as (_, address):

@@ -23,6 +23,7 @@ SMALL = ("--max-distance", "3", "--intersections", "3")
 run = partial(run_main, main)
 
 
+@pytest.mark.long
 def test_help_and_unknown_commands_as_a_process():
     def call(*arguments):
         return subprocess.run([BIN / "vm-mesh", *arguments], capture_output=True, text=True)
@@ -36,6 +37,7 @@ def test_help_and_unknown_commands_as_a_process():
     assert "'quality'" in wrong.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", sorted(set(MESH_MODELS) - {"wall6"}))
 def test_show_draws_every_model(model, tmp_path, capsys):
     file = tmp_path / "mesh.png"
@@ -46,6 +48,7 @@ def test_show_draws_every_model(model, tmp_path, capsys):
     assert orange > 100  # objects
 
 
+@pytest.mark.long
 def test_show_draws_the_mesh_of_vm_detect(tmp_path, capsys):
     """Without options, it is that of the network that vm-detect uses without --model."""
     said = [
@@ -58,6 +61,7 @@ def test_show_draws_the_mesh_of_vm_detect(tmp_path, capsys):
     assert said[0].endswith(f"{manifest.mesh}, {len(mesh)} points\n")
 
 
+@pytest.mark.long
 def test_show_draws_walls_by_direction_and_not_on_the_ground(tmp_path, capsys):
     post = ("--model", "wall6", "--shape", "cylinder", "--radius", 0.05, "--object-height", 1.8, *SMALL)
     run(capsys, "show", *post, "-o", tmp_path / "walls.svg")
@@ -127,6 +131,7 @@ def test_quality_writes_what_it_prints(tmp_path, capsys):
     assert (tmp_path / "q.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_compare_leaves_out_models_that_do_not_fit(capsys):
     shown = run(capsys, "compare", "--shape", "cylinder", "--radius", 0.05, "--object-height", 1.8, *SMALL)
     assert "wall6" in shown
@@ -143,6 +148,7 @@ def test_range_says_where_a_step_is_a_pixel(capsys):
     assert all((float(row[2]) < 1.0) == (float(row[0]) > limit) for row in rows)
 
 
+@pytest.mark.long
 def test_a_picture_needs_a_pose(tmp_path, capsys):
     lens = tmp_path / "lens.toml"
     lens.write_text('projection = "rectilinear"\nfocal_length = 400.0\nfov = 2.0\n')

@@ -40,6 +40,7 @@ def test_arguments_of_ros_need_ros():
     assert reason(done).startswith("--ros-args works only with rclpy")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("domain", ["233", "-1", "one"])
 def test_a_wrong_domain_is_named(domain):
     assert reason(run(ROS_DOMAIN_ID=domain)) == f"ROS_DOMAIN_ID must be a number from 0 to 232, not {domain!r}"
@@ -78,6 +79,7 @@ def test_topics_of_ros_are_accepted(namespace):
     assert configuration(parser().parse_args(words)).ros.namespace == namespace
 
 
+@pytest.mark.long
 def test_vm_detect_names_vm_ros_for_topics():
     command = [COMMAND.with_name("vm-detect"), "--camera"]
     tf = "pose source tf works only with vm-ros and bags; give fixed, stdin, udp: or unix:"
@@ -89,6 +91,7 @@ def test_vm_detect_names_vm_ros_for_topics():
         assert reason(done) == expected
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "words", [["--camera", "ros"], ["--camera", "/dev/video0", "--fov", "1.0", "--pose-source", "tf"]]
 )

@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 from vm_embedded.cameras.ros.bag_types import bag_types, typestore
 from vm_embedded.cameras.ros.message_fields import FIELDS, MESSAGES, fields_of, short_name
+from vm_ros.cdr import encode
 from vm_ros.dds_messages import message_classes
+from vm_ros.plain_messages import plain_classes
 
-DDS = message_classes()
+DDS, PLAIN = message_classes(), plain_classes(map(short_name, FIELDS))
 BAG = bag_types()
 STORE = typestore()
 
@@ -75,6 +77,7 @@ def test_each_message_has_the_bytes_of_ros(full):
     @given(contents(full))
     def check(values):
         encoded = made(DDS, full, values).serialize()
+        assert encode(short_name(full), made(PLAIN, full, values)) == encoded
         assert encoded == bytes(STORE.serialize_cdr(made(BAG, full, values), full))
         assert plain(STORE.deserialize_cdr(encoded, full)) == values
         assert plain(getattr(DDS, short_name(full)).deserialize(encoded)) == values
@@ -84,4 +87,5 @@ def test_each_message_has_the_bytes_of_ros(full):
 
 def test_the_levels_of_diagnostics_are_those_of_ros():
     for name in ("OK", "WARN", "ERROR"):
-        assert getattr(DDS.DiagnosticStatus, name) == getattr(BAG.DiagnosticStatus, name)
+        levels = {getattr(each.DiagnosticStatus, name) for each in (DDS, PLAIN, BAG)}
+        assert len(levels) == 1

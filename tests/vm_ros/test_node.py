@@ -1,16 +1,26 @@
 """vm-ros as a robot uses it: another process sends images and poses over DDS, and receives detections and states."""
 
+import asyncio
+import threading
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
 
 from tests.vm_embedded.cameras.ros.rolling_ball import LENS, OFFSET, SIZE
+from tests.vm_embedded.output.features import demo_frame
 from tests.waiting import wait
 from vm_embedded import Detector, Settings
+from vm_embedded.cameras.camera import Shot
+from vm_embedded.cameras.ros.message_fields import FIELDS, short_name
 from vm_embedded.cameras.ros.stamps import seconds_of, stamp_of
 from vm_embedded.cameras.ros.transforms import transform_message
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA, Orientation
+from vm_ros.cli import configuration, parser
 from vm_ros.middleware import FIXED_TRANSFORMS
+from vm_ros.node import Node
+from vm_ros.plain_messages import plain_classes
 
 from .loopback import running
 from .robot import Robot
@@ -152,6 +162,7 @@ def test_a_bag_that_is_played_has_a_clock_of_its_own(tmp_path, peer):
     assert seconds_of(peer.received(ON_PLANE)[-1].header.stamp) <= max(robot.shown)
 
 
+@pytest.mark.long
 def test_another_camera_may_be_fixed_in_tf(tmp_path, peer):
     peer.listen(ON_PLANE, "Detection3DArray")
     fixed = peer.middleware.publisher("/tf_static", "TFMessage", FIXED_TRANSFORMS)
@@ -221,3 +232,44 @@ def test_the_status_says_what_is_missing(tmp_path, peer):
     with Robot(peer), running(tmp_path, "--ros-camera-info", "/nothing") as node:
         node.wait(lambda: any("no message on /nothing yet" in reason for _, _, reason, _ in states(peer)))
         node.stop()
+
+
+class Gate:
+    """A connection whose publishers wait until it opens. sent: what came through, by topic."""
+
+    types, parameters, remark = plain_classes(map(short_name, FIELDS)), {}, ""
+
+    def __init__(self):
+        self.opened, self.sent = threading.Event(), {}
+
+    def publisher(self, topic, message, kind=None):
+        def publish(message):
+            assert topic == STATES or self.opened.wait(60.0)
+            self.sent.setdefault(topic, []).append(message)
+
+        return SimpleNamespace(publish=publish, readers=1 if topic in (STATES, IN_IMAGE, ON_PLANE) else 0)
+
+    def close(self):
+        pass
+
+
+def test_a_slow_reader_delays_no_frame_but_the_one_after_the_next():
+    gate = Gate()
+    node = Node(configuration(parser().parse_args(["--camera", "synthetic"])), gate)
+    image, found = demo_frame()
+    answers = [
+        SimpleNamespace(shot=Shot(image, captured), detections=found, orientation=Orientation.from_roll_pitch(0.6))
+        for captured in (1.0, 2.0)
+    ]
+    node.publish({"state": "ok"}, answers[0])
+    assert list(gate.sent) == [STATES]
+    second = threading.Thread(target=node.publish, args=({"state": "ok"}, answers[1]))
+    second.start()
+    second.join(0.1)
+    assert second.is_alive()
+    gate.opened.set()
+    second.join(60.0)
+    asyncio.run(node.close())
+    for topic in (IN_IMAGE, ON_PLANE):
+        first, last = (seconds_of(each.header.stamp) for each in gate.sent[topic])
+        assert last - first == pytest.approx(1.0, abs=1e-3)

@@ -93,6 +93,7 @@ def test_without_mitsuba_it_says_what_to_install_in_one_line(maps, tmp_path):
     )
 
 
+@pytest.mark.long
 def test_a_damaged_map_is_named_and_left_out(maps, tmp_path, capsys):
     try:
         load_mitsuba()

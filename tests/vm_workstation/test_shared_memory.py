@@ -26,6 +26,7 @@ def how(request):
     return request.param
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("program", "options"),
     [

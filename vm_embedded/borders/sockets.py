@@ -208,6 +208,8 @@ class Acceptor:
     def close(self) -> None:
         """Stop accepting. Open connections remain."""
         self._task.cancel()
+        # Without this, the loop would do it at its next turn, when a new connection may have the descriptor's number.
+        self._task.get_loop().remove_reader(self._listening)
         self._listening.close()
 
 

@@ -29,18 +29,18 @@ def distort(radius: Floats, distortion: tuple[float, float]) -> Floats:
     low, high = np.zeros_like(target), np.minimum(2.25 * target, largest)
     distorted = np.minimum(target, high)
     moving = np.ones(target.shape, dtype=bool)
-    for _ in range(100):
-        square = distorted * distorted
-        error = undistort(distorted, distortion) - target
-        low, high = np.where(error < 0, distorted, low), np.where(error > 0, distorted, high)
-        with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for _ in range(100):
+            square = distorted * distorted
+            error = undistort(distorted, distortion) - target
+            low, high = np.where(error < 0, distorted, low), np.where(error > 0, distorted, high)
             newton = distorted - error / (1.0 + square * (3.0 * k0 + square * 5.0 * k1))
-        better = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
-        # Each radius stops on its own iteration. So its digits do not depend on the other radii.
-        moving &= np.abs(better - distorted) > 1e-10
-        if not moving.any():
-            break
-        distorted = np.where(moving, better, distorted)
+            better = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
+            # Each radius stops on its own iteration. So its digits do not depend on the other radii.
+            moving &= np.abs(better - distorted) > 1e-10
+            if not moving.any():
+                break
+            distorted = np.where(moving, better, distorted)
     return distorted
 
 

@@ -79,7 +79,7 @@ class RadialLens(Lens):
             factor = self.radius_over_sine(rays[:, 0])
             if self.distortion != (0.0, 0.0):
                 undistorted = factor * np.hypot(rays[:, 1], rays[:, 2])
-                ratio = distort(np.nan_to_num(undistorted, posinf=0.0), self.distortion) / undistorted
+                ratio = distort(np.where(np.isfinite(undistorted), undistorted, 0.0), self.distortion) / undistorted
                 factor = factor * np.where(undistorted > 0, ratio, 1.0)
             pixels = np.empty((len(rays), 2))
             pixels[:, 0] = self._origin(size)[0] - factor * rays[:, 1]

@@ -130,6 +130,7 @@ def take_turns(pipe, path, turns):
     pipe.send(lost)
 
 
+@pytest.mark.long
 def test_a_listener_that_is_closed_removes_no_file_of_another(tmp_path):
     processes, pipes = spawn(take_turns, 3, tmp_path / "socket", 300)
     assert [each.recv() for each in pipes] == [0, 0, 0]
@@ -270,3 +271,25 @@ def test_connections_of_a_flood_are_accepted_with_pauses(tmp_path, monkeypatch):
     asyncio.run(flood())
     assert served == 4 * [b"x\n"]
     assert not list(tmp_path.iterdir())
+
+
+def test_the_number_of_a_listener_that_closes_is_free_for_a_new_connection(tmp_path):
+    async def close_and_connect():
+        errors = []
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, context: errors.append(context))
+        listener = UnixListener(tmp_path / "socket", "--option")
+        number = listener.fileno()
+        acceptor = Acceptor(listener, lambda reader, writer: None, 1024)
+        await asyncio.sleep(0.01)
+        acceptor.close()
+        near, far = socket.socketpair()
+        assert near.fileno() == number
+        reader, writer = await asyncio.open_connection(sock=near)
+        far.sendall(b"x\n")
+        line = await asyncio.wait_for(reader.readline(), 10.0)
+        writer.close()
+        far.close()
+        return line, errors
+
+    assert asyncio.run(close_and_connect()) == (b"x\n", [])

@@ -79,6 +79,7 @@ def test_printable_characters_make_good_names(name):
     name.encode()
 
 
+@pytest.mark.long
 @given(st.text(max_size=2 * MOST_NAME))
 def test_a_good_name_is_one_line_of_text_in_every_format(name):
     if not name_fault(name):

@@ -129,6 +129,7 @@ def test_photos_are_turned_as_films_are(tmp_path):
     assert np.abs(frame.astype(float) - upright(6)).mean() < 25.0
 
 
+@pytest.mark.long
 def test_a_phone_s_photo_shows_the_balls_that_the_upright_one_shows(shared, tmp_path):
     case = shared / "cases" / "exif-turned"
     if not case.is_dir():

@@ -53,6 +53,7 @@ def video(tmp_path):
     return path
 
 
+@pytest.mark.long
 def test_attack_2_a_video_of_large_frames_is_refused(video, tmp_path):
     options = (video, "--camera-max-megapixels", "0.1", "--fov", "70deg", "--height", "0.6")
     done = run_preloaded([COMMAND, *options])
@@ -75,6 +76,7 @@ def test_attack_2_a_frame_larger_than_the_video_said_is_left_out(monkeypatch, vi
         frames[0].read()
 
 
+@pytest.mark.long
 def test_files_may_be_played_as_a_camera_gives_them_and_end(tmp_path):
     lens = ("--lens", DEMO / "lens0000000.yaml", "--height", "0.6")
     options = ("--camera", DEMO, "--live", "--camera-fps", "20", *lens)

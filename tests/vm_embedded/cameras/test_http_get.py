@@ -160,6 +160,7 @@ def camera_finding(*options):
     return [each for each in findings if each["about"] == "camera"][-1]
 
 
+@pytest.mark.long
 def test_the_doctor_says_what_is_wrong_with_the_frames(tmp_path, pictures):
     half = [each[: len(each) // 2] + each[-2:] for each in pictures]
     mixed = [each for pair in zip(half, pictures, strict=True) for each in pair]

@@ -92,6 +92,7 @@ def test_what_is_no_motion_jpeg_is_said(pictures):
         MjpegCamera(CameraSettings(source=server.address))
 
 
+@pytest.mark.long
 def test_a_server_that_is_killed_and_started_again_is_found_again(tmp_path, pictures):
     (tmp_path / "vm.toml").write_text(LENS)
     server = Server(pictures)
@@ -128,6 +129,7 @@ def test_characters_that_http_does_not_allow_are_escaped(pictures):
     assert server.requests[0].startswith(b"GET /my%20cam/%C3%A4%20?size=1%202&a=%C3%BC/? HTTP/1.1\r\n")
 
 
+@pytest.mark.long
 def test_passwords_of_cameras_are_not_shown(tmp_path):
     pose = ("--lens", DEMO / "lens0000000.yaml", "--height", 0.6)
     with running(tmp_path, "--camera", "http://user:secret@127.0.0.1:9/x", *pose) as found:

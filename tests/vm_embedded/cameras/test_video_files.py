@@ -51,6 +51,7 @@ def read(path):
     return stamps, lost, list(source.remarks())
 
 
+@pytest.mark.long
 def test_the_damaged_film_of_the_report_is_read_to_its_end(shared, tmp_path):
     folder = shared / "cases/video"
     stamps, lost, (remark,) = read(folder / "damaged-5-percent.mp4")

@@ -64,6 +64,7 @@ def test_a_slow_processor_a_slow_governor_and_a_slow_clock_are_seen(root):
     assert "scaling_governor" in seen["governor"].mend
 
 
+@pytest.mark.long
 def test_the_processor_of_a_jetson_or_a_raspberry_pi_is_known(root):
     (root / "proc/cpuinfo").write_text("processor : 0\nFeatures : fp asimd evtstrm\nCPU part : 0xd0b\n")
     assert (found(HEALTHY, root)["processor"].state, found(HEALTHY, root)["processor"].seen) == (GOOD, "ARM: asimd")
@@ -71,6 +72,7 @@ def test_the_processor_of_a_jetson_or_a_raspberry_pi_is_known(root):
     assert "no asimd" in found(HEALTHY, root)["processor"].seen
 
 
+@pytest.mark.long
 def test_the_password_of_a_camera_is_not_shown(root):
     for source in ("rtsp://user:s@cret@10.0.0.7/1", "http://user:s@cret@:0/"):
         camera = replace(HEALTHY.camera, source=source)
@@ -93,6 +95,7 @@ def test_a_wrong_clock_is_seen(tmp_path):
     assert "timedatectl" in check_clock(tmp_path / "none", 1e9).mend
 
 
+@pytest.mark.long
 def test_a_camera_that_is_not_there_or_may_move_is_seen(root):
     wanted = replace(HEALTHY, camera=CameraSettings(source="0"))
     assert found(wanted, root)["camera"].state == BAD
@@ -128,6 +131,7 @@ def test_a_lens_for_another_size_is_seen(root):
     assert "size: [width, height] in YAML" in found(without, root)["lens"].mend
 
 
+@pytest.mark.long
 def test_files_that_are_no_pictures_are_seen(root, tmp_path):
     (tmp_path / "note.txt").write_text("no picture")
     (tmp_path / "empty").mkdir()
@@ -137,6 +141,7 @@ def test_files_that_are_no_pictures_are_seen(root, tmp_path):
         assert (seen.state, says in seen.seen) == (BAD, True), seen
 
 
+@pytest.mark.long
 def test_a_topic_and_a_pattern_of_pictures_are_cameras(root, tmp_path):
     cv2.imwrite(str(tmp_path / "image.png"), np.zeros((512, 640, 3), dtype=np.uint8))
     for source in ("ros", str(tmp_path / "*.png")):
@@ -144,6 +149,7 @@ def test_a_topic_and_a_pattern_of_pictures_are_cameras(root, tmp_path):
         assert (seen["camera"].state, seen["lens"].state) == (GOOD, GOOD), seen
 
 
+@pytest.mark.long
 def test_a_lens_for_other_pictures_is_seen(root, tmp_path):
     cv2.imwrite(str(tmp_path / "image.png"), np.zeros((480, 640, 3), dtype=np.uint8))
     lens = found(replace(HEALTHY, camera=CameraSettings(source=str(tmp_path / "image.png"))), root)["lens"]
@@ -210,6 +216,7 @@ def test_an_object_that_is_too_large_for_the_height_of_the_camera_is_seen(height
         assert check_pose(allowed, SourceFacts(), model).state == GOOD
 
 
+@pytest.mark.long
 def test_a_live_camera_without_lens_or_pose_is_a_failure_of_these_and_not_of_the_model(root):
     noise = np.random.default_rng(0).integers(0, 256, (9, 64, 80, 3)).astype(np.uint8)
     server = Server([cv2.imencode(".jpg", each)[1].tobytes() for each in noise])
@@ -260,6 +267,7 @@ def test_frames_that_do_not_fit_the_lens_are_a_failure_of_the_detection():
     assert (seen.state, "640 x 512" in seen.seen) == (BAD, True), seen
 
 
+@pytest.mark.long
 def test_where_poses_come_from_is_shown(root):
     seen = found(replace(HEALTHY, pose=PoseSettings(source="udp:0.0.0.0:5600")), root)["pose"]
     assert (seen.state, seen.seen) == (GOOD, "from udp:0.0.0.0:5600")

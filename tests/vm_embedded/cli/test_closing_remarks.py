@@ -23,6 +23,7 @@ def test_a_few_frames_say_nothing():
     assert run(*PICTURES[:4], *NOTHING).stderr == ""
 
 
+@pytest.mark.long
 def test_features_of_the_field_show_that_lens_and_pose_are_right():
     found = run(*PICTURES[:6], "--model", "soccer", "--min-confidence", 1)
     assert found.stderr == ""

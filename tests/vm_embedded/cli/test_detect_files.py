@@ -107,6 +107,7 @@ def test_of_several_sources_none_may_be_live():
     one_complaint(run("synthetic", IMAGES[0], code=1), "only one live camera")
 
 
+@pytest.mark.long
 def test_live_plays_the_images_of_a_pattern_in_their_order(tmp_path):
     for number, image in enumerate((IMAGES[0], IMAGES[1], IMAGES[0])):
         shutil.copy(image, tmp_path / f"image{10**number}.jpg")
@@ -155,6 +156,7 @@ def beside(image):
     return image.with_name(image.name.replace("image", "lens")).with_suffix(".yaml")
 
 
+@pytest.mark.long
 def test_a_given_lens_file_with_hoc_gives_the_orientation(tmp_path):
     """Of a picture without a lens file beside it, and of the frames of a video."""
     photo, clip = tmp_path / "photo.jpg", film(tmp_path / "clip.avi", 1)
@@ -325,6 +327,7 @@ def test_a_video_of_a_video_has_its_rate(tmp_path, lens):
     assert cv2.VideoCapture(str(tmp_path / "found.mp4")).get(cv2.CAP_PROP_FPS) == pytest.approx(25.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("suffix", [".mp4", ".avi", ".webm"])
 def test_a_video_that_a_full_disk_cuts_short_is_an_error_and_the_old_one_stays(suffix, tmp_path, lens):
     """A limit on the size of files lets writes fail as a full disk does."""

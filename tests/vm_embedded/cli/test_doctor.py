@@ -4,6 +4,8 @@ import json
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.preloaded import run_preloaded
 
 COMMAND = Path(sys.executable).parent / "vm-doctor"
@@ -19,6 +21,7 @@ def test_the_command_prints_findings_and_fails_if_one_is_in_the_way(tmp_path):
     assert done.returncode == 1
 
 
+@pytest.mark.long
 def test_the_command_searches_the_frames_of_the_user(tmp_path):
     demo = Path(__file__).parents[2] / "fixtures" / "demo"
     done = run_preloaded([COMMAND, "--json", "--status-socket", tmp_path / "socket", "--camera", demo])

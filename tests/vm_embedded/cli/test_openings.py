@@ -68,6 +68,7 @@ def test_check_config_refuses_it(tmp_path, port, options, says):
     assert says.format(port=port) in line
 
 
+@pytest.mark.long
 def test_vm_doctor_finds_all_of_it(tmp_path, port):
     bad = ("--output-file", "/nowhere/x.jsonl", "--output-unix", "/nowhere/x.sock", "--pose-source", "tf")
     bad += (
@@ -87,6 +88,7 @@ def test_vm_doctor_finds_all_of_it(tmp_path, port):
     assert found["status socket"]["state"] == GOOD
 
 
+@pytest.mark.long
 def test_what_a_running_detector_uses_is_no_fault(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as free:
         address = "{}:{}".format(*free.getsockname())

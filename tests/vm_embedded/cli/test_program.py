@@ -129,6 +129,7 @@ def completed(line, folder):
     return done.stdout.split()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("line", "offered"),
     [
@@ -222,6 +223,7 @@ def test_without_standard_output_and_error_lost_output_is_still_a_failure():
     assert done.returncode == 1
 
 
+@pytest.mark.long
 def test_a_daemon_that_writes_elsewhere_needs_no_standard_output(tmp_path):
     shell = f"{BIN / 'vm-detect'} --live {DEMO} --no-output-stdout --output-file {tmp_path / 'lines'} >&-"
     done = subprocess.run(["sh", "-c", shell], stderr=subprocess.PIPE, text=True, timeout=120, check=False)

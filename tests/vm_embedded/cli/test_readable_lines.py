@@ -37,6 +37,7 @@ def test_json_and_points_are_json_at_a_terminal_too(options, tmp_path):
     assert json.loads(output)["source"] == IMAGES[0].name
 
 
+@pytest.mark.long
 def test_a_live_camera_prints_a_line_for_each_frame_and_no_states(folder):
     options = "--live", "--no-json", "--model", MODEL, "--camera-fps", "2", "--camera-max-age-ms", "10000"
     lines = run(folder, *options).stdout.splitlines()
@@ -47,6 +48,7 @@ def test_a_live_camera_prints_a_line_for_each_frame_and_no_states(folder):
     assert {each["type"] for each in messages} == {"frame", "state"}
 
 
+@pytest.mark.long
 def test_make_demo_prints_lines_for_people_into_a_pipe(tmp_path):
     made = subprocess.run(["make", "--dry-run", "demo"], cwd=TOP, capture_output=True, text=True, check=True)
     (command,) = [each for each in made.stdout.splitlines() if "vm-detect" in each]

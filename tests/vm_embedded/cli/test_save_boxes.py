@@ -55,6 +55,7 @@ def test_the_folder_is_processed_again_with_its_lens_and_pose(tmp_path):
     assert [each["detections"] for each in again] == [each["detections"] for each in before]
 
 
+@pytest.mark.long
 def test_near_misses_are_in_no_yolo_file(tmp_path):
     out = tmp_path / "boxes"
     found = lines(

@@ -123,6 +123,7 @@ def test_names_of_categories_do_not_control_the_terminal(tmp_path, image):
     assert b"owned" in output
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["vm-train check --boxes", "vm-train check", "vm-label", "vm-synth check"])
 def test_the_names_of_files_do_not_control_the_terminal(command, tmp_path, image):
     folder = tmp_path / f"a{ESCAPE.replace('/', '')}" / os.fsdecode(b"b\xff\n\x9bc")

@@ -65,6 +65,7 @@ def without_bucket(detector, image, orientation, lens):
     return fresh.detect(image, orientation, lens)
 
 
+@pytest.mark.long
 @in_both_layouts
 @given(
     index=st.integers(0, 5),

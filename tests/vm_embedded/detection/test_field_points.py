@@ -53,6 +53,7 @@ def painted(detector: Detector, orientation: Orientation) -> Observation:
     return replace(seen, manifest=replace(seen.manifest, classes=SOCCER), slot_answers=probabilities)
 
 
+@pytest.mark.long
 @given(yaw=st.floats(-3.0, 3.0), roll=st.floats(-0.2, 0.2), pitch=st.floats(0.1, 0.6))
 def test_places_on_the_plane_have_the_pixels_of_their_points(detector, yaw, roll, pitch):
     seen = painted(detector, Orientation.from_roll_pitch(0.8, roll, pitch, yaw))

@@ -195,6 +195,7 @@ def test_a_larger_object_radius_is_an_object_of_more_rings():
     assert found[0].position[2] == pytest.approx(0.12)
 
 
+@pytest.mark.long
 @given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.2))
 @settings(max_examples=25)
 def test_how_the_mesh_lies_in_memory_changes_no_digit(seed, noise):

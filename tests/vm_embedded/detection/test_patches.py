@@ -49,6 +49,7 @@ def test_samples_are_at_the_pixels_of_their_rays(lens, pixel, height, pitch):
     assert np.abs(found - exact).max() < 0.25 * side + 1e-3
 
 
+@pytest.mark.long
 @given(lenses, pixels, st.floats(0.5, 1.5), st.floats(0.0, 1.2))
 def test_a_ball_fills_the_same_disk_at_every_distance(lens, pixel, height, pitch):
     view = view_at(height, pitch, lens)

@@ -194,6 +194,7 @@ def test_an_object_is_found_once_at_its_place_in_any_strip(scene, seed):
     assert len(seen.find_peaks("ball", 40)) == len(seen.find_peaks("robot", 40)) == 0
 
 
+@pytest.mark.long
 @given(scenes(), seeds)
 def test_an_object_on_the_border_between_two_strips_is_found_once(scene, seed):
     """Both strips have it with a high score."""
@@ -211,6 +212,7 @@ def test_an_object_on_the_border_between_two_strips_is_found_once(scene, seed):
     assert_found(view, observed(view, manifest, [("ball", ray, 0.0, 4.0)]).find_peaks("ball", 9), [ray], [4.0], [0.0])
 
 
+@pytest.mark.long
 @given(scenes(), seeds, st.integers(2, 6))
 def test_objects_apart_are_all_found_best_first_and_not_more_than_asked_for(scene, seed, count):
     manifest, view = scene
@@ -346,6 +348,7 @@ def place_of(view, ray):
     return np.array([x, y]) * view.height / -z
 
 
+@pytest.mark.long
 @given(scenes(), seeds)
 def test_a_peak_of_an_upright_is_its_base(scene, seed):
     manifest, view = scene

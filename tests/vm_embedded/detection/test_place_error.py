@@ -14,6 +14,7 @@ from vm_embedded.detection.track_settings import TrackSettings
 NONE = dict.fromkeys(CLEAN, 0.0) | {"pose": 1e-6}
 
 
+@pytest.mark.long
 @settings(max_examples=20)
 @given(st.floats(0.3, 4.0), st.floats(-math.pi, math.pi))
 def test_simulated_places_have_the_covariance(distance, azimuth):

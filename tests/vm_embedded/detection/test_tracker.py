@@ -27,6 +27,7 @@ def frame_times(seconds, start=5.0):
     return start + FRAME * np.arange(round(seconds / FRAME))
 
 
+@pytest.mark.long
 def test_a_rolling_ball_is_where_the_track_says_more_than_where_single_detections_are():
     single, tracked, velocity = [], [], []
     for seed in RUNS:
@@ -76,6 +77,7 @@ def test_the_smallest_errors_leave_the_tracks_finite():
         TrackSettings(pose_error=0.0)
 
 
+@pytest.mark.long
 def test_a_ball_keeps_its_number_when_it_is_hidden_for_a_third_of_a_second():
     kept = 0
     for seed in RUNS:
@@ -114,6 +116,7 @@ def visible(balls, time):
     return [near] if hidden else [0, 1]
 
 
+@pytest.mark.long
 def test_two_balls_that_cross_keep_their_numbers():
     """One passes just behind the other, or hides it for a while."""
     kept = hidden = 0
@@ -159,6 +162,7 @@ def test_a_ball_elsewhere_is_another_ball():
     assert again.track.id == 1
 
 
+@pytest.mark.long
 def test_a_ball_that_is_kicked_keeps_its_number_and_gets_its_velocity():
     kept, early, late = 0, [], []
     for seed in RUNS:

@@ -17,6 +17,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.live.control import ControlServer, ask, control_path
 
 
+@pytest.mark.long
 def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_path):
     left = socket.socket(socket.AF_UNIX)
     left.bind(str(tmp_path / "control"))
@@ -36,6 +37,7 @@ def test_a_socket_that_was_left_behind_is_replaced_and_one_in_use_is_not(tmp_pat
         found.stop()
 
 
+@pytest.mark.long
 def test_a_client_that_says_nothing_is_let_go_of_at_the_end(tmp_path):
     with running(tmp_path, "--camera", "synthetic") as found:
         found.wait_for_state("ok")
@@ -58,6 +60,7 @@ def test_a_command_that_fails_leaves_no_connection(tmp_path):
     assert asyncio.run(ask_often()) == "fine"
 
 
+@pytest.mark.long
 def test_asking_what_is_no_detector_ends(tmp_path):
     path = tmp_path / "other"
     with socket.socket(socket.AF_UNIX) as other:

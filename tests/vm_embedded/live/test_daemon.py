@@ -49,6 +49,7 @@ def test_a_signal_ends_it_and_its_sockets_are_gone(tmp_path, number):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_systemd_hears_that_it_is_ready_how_it_is_and_that_it_lives(tmp_path):
     path = tmp_path / "notify"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listening:
@@ -67,6 +68,7 @@ def test_systemd_hears_that_it_is_ready_how_it_is_and_that_it_lives(tmp_path):
     assert heard.index("READY=1") < heard.index("STATUS=ok")
 
 
+@pytest.mark.long
 def test_a_camera_that_is_not_there_yet_is_waited_for(tmp_path):
     pose = ("--lens", DEMO / "lens0000000.yaml", "--height", 0.6)
     with running(tmp_path, "--camera", "/dev/video-none", "--camera-retry-ms", "20", *pose) as found:
@@ -80,6 +82,7 @@ def test_a_camera_that_is_not_there_yet_is_waited_for(tmp_path):
     assert found.frames == []
 
 
+@pytest.mark.long
 def test_frames_that_are_late_because_of_their_detection_say_what_to_change(tmp_path):
     # A tiny ball needs a mesh with many points: the detection takes longer than a busy core keeps a frame waiting.
     slow = ("--object-radius", 0.008, "--camera-max-age-ms", 100)
@@ -109,6 +112,7 @@ def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad
         found.stop()
 
 
+@pytest.mark.long
 def test_hangup_refuses_files_that_may_never_end(tmp_path):
     path, model, pipe = (tmp_path / each for each in ("vm.toml", "model.onnx", "pipe"))
     model.symlink_to(model_path("ball-small"))
@@ -125,6 +129,7 @@ def test_hangup_refuses_files_that_may_never_end(tmp_path):
         assert found.stop()[0] == 0
 
 
+@pytest.mark.long
 def test_a_second_signal_ends_it_at_once(tmp_path):
     kept = tmp_path / "recordings"
     with running(tmp_path, "--recorder-folder", kept, faults=[Fault("hang", at=1.0, seconds=60.0)]) as found:

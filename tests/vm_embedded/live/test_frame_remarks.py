@@ -31,6 +31,7 @@ def remarks(found, event):
     return [each["reason"] for each in list(found.events) if each["event"] == event]
 
 
+@pytest.mark.long
 def test_a_height_in_centimeters_degrades_it(tmp_path, film):
     with running(tmp_path, *film, "--height", 80, "--pitch", "20deg") as found:
         found.wait_for_state("degraded")
@@ -41,6 +42,7 @@ def test_a_height_in_centimeters_degrades_it(tmp_path, film):
     assert reason == ("the camera's height is 80 m, but the mesh ends at a distance of 6 m: heights are in meters")
 
 
+@pytest.mark.long
 def test_so_do_poses_in_centimeters_until_they_are_right(tmp_path, film):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
@@ -60,6 +62,7 @@ def test_so_do_poses_in_centimeters_until_they_are_right(tmp_path, film):
     assert "heights are in meters" in next(each["reason"] for each in found.events if each.get("state") == "degraded")
 
 
+@pytest.mark.long
 def test_a_camera_that_looks_up_stays_ok_and_the_log_says_once_that_it_sees_nothing(tmp_path, film):
     with running(tmp_path, *film, "--height", 0.8, "--pitch=-80deg") as found:
         found.wait_for_state("ok")
@@ -72,6 +75,7 @@ def test_a_camera_that_looks_up_stays_ok_and_the_log_says_once_that_it_sees_noth
     assert "degraded" not in found.states
 
 
+@pytest.mark.long
 def test_a_lens_in_millimeters_is_said_once(tmp_path, film):
     (tmp_path / "lens.yaml").write_text("projection: RECTILINEAR\nfocal_length: 3.6\nfov: 1.66\n")
     options = (*film[:-2], "--lens", tmp_path / "lens.yaml", "--height", 0.8, "--pitch", "20deg")

@@ -114,6 +114,7 @@ def test_a_browser_that_reads_nothing_is_disconnected(tmp_path, monkeypatch, add
     asyncio.run(serve())
 
 
+@pytest.mark.long
 def test_orientations_beside_the_camera_s_are_prepared_between_frames(tmp_path):
     local = ("--status-metrics", f"unix:{tmp_path / 'figures'}")
     with running(tmp_path, "--camera", "synthetic", *local) as found:
@@ -131,6 +132,7 @@ def test_orientations_beside_the_camera_s_are_prepared_between_frames(tmp_path):
         found.stop()
 
 
+@pytest.mark.long
 def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
     with socket.socket() as made:
         made.bind(("127.0.0.1", 0))
@@ -184,6 +186,7 @@ def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
         found.stop()
 
 
+@pytest.mark.long
 def test_attack_12_a_page_that_the_network_can_reach_is_warned_about(tmp_path):
     with socket.socket() as one, socket.socket() as other:
         for each in (one, other):

@@ -55,6 +55,7 @@ def check_refusal(folder, options, status, says):
     assert (folder / "control").exists() is False
 
 
+@pytest.mark.long
 def test_what_can_not_be_read_or_written_is_said_without_a_traceback(tmp_path):
     command = arguments(tmp_path, "--camera", "synthetic")
     for more, says in (
@@ -88,6 +89,7 @@ def test_the_printed_configuration_can_be_put_into_any_folder(tmp_path):
     assert done.stdout == alone
 
 
+@pytest.mark.long
 def test_the_printed_configuration_is_one_and_says_what_the_defaults_are(tmp_path):
     path = tmp_path / "vm.toml"
     printed = run_program(COMMAND, "--print-config").stdout
@@ -132,6 +134,7 @@ def test_an_address_that_the_network_may_get_later_asks_for_a_restart(tmp_path):
     assert "can't start" in done.stderr
 
 
+@pytest.mark.long
 def test_a_signal_ends_the_wait_for_the_network_as_usual(tmp_path):
     command = arguments(tmp_path, "--camera", "synthetic", "--status-page", "192.0.2.1:8080")
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
@@ -147,6 +150,7 @@ def test_a_signal_ends_the_wait_for_the_network_as_usual(tmp_path):
     assert "signal" in rest.splitlines()[-1]
 
 
+@pytest.mark.long
 def test_a_running_detector_is_asked_although_its_vm_toml_has_got_an_error(tmp_path):
     (tmp_path / "vm.toml").write_text(f"[camera]\nfsp = 3\n[status]\nsocket = '{tmp_path / 'control'}'\n")
     with running(tmp_path, "--camera", "synthetic") as found:

@@ -67,6 +67,7 @@ def test_attack_6_hundreds_of_silent_connections_do_no_harm(name, tmp_path):
     assert len(found.events) < 100
 
 
+@pytest.mark.long
 def test_readers_of_lines_are_served_while_others_flood_their_socket(tmp_path):
     options, addresses = sockets(tmp_path)
     with running(tmp_path, *options, preexec_fn=few_descriptors) as found, ExitStack() as stack:

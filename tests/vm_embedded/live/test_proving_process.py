@@ -107,6 +107,7 @@ onnxruntime.InferenceSession = Session
 """A module that Python imports at its start: it tells who runs a network, and then runs it."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", [("vm-detect", "--check-config"), ("vm-doctor",)])
 def test_attack_11_the_process_that_checks_a_model_never_runs_it(tmp_path, command):
     """As root, what vm-deploy and install.sh start would otherwise run a network of an enemy with all rights."""
@@ -130,6 +131,7 @@ def test_attack_11_the_process_that_checks_a_model_never_runs_it(tmp_path, comma
         assert {uid for uid, _ in sessions} == {"65534"}
 
 
+@pytest.mark.long
 def test_attack_3_frames_and_signals_go_on_while_a_new_model_is_proved(tmp_path):
     path, model = tmp_path / "vm.toml", tmp_path / "model.onnx"
     text = 'model = "{}"\n[camera]\nsource = "synthetic"\n'

@@ -72,6 +72,7 @@ if sys.orig_argv[1].endswith("vm-detect"):
 """A module that Python imports at its start."""
 
 
+@pytest.mark.long
 def test_a_reload_that_fails_in_an_unknown_way_says_so(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(FAULT)
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])

@@ -59,6 +59,7 @@ def _answer(connection, content, until):
         os.read(until, 1)
 
 
+@pytest.mark.long
 def test_a_stream_that_returns_while_the_process_ends_does_no_harm(half_a_video, tmp_path):
     config = tmp_path / "vm.toml"
     config.write_text(LENS)

@@ -43,6 +43,7 @@ def start(tmp_path):
         each.wait()
 
 
+@pytest.mark.long
 def test_it_ends_in_order(start, tmp_path):
     found = start("--recorder-folder", tmp_path / "recordings")
     found.wait_for_state("ok")

@@ -13,7 +13,7 @@ from vm_embedded.mesh.models import build_mesh
 
 from ..brute_force import STEPS, center_height, plain_grid, plain_position
 from ..strategies import reals
-from .test_models import BALL, CASES, GRIDS, every_case, mesh_of
+from .test_models import BALL, CASES, GRIDS, mesh_of
 
 
 def around_nadir(mesh, width):
@@ -43,11 +43,11 @@ def assert_is_flood_filled(mesh, kind, width, shape, height, k, max_distance):
     np.testing.assert_array_equal(mesh.neighbors, [*links, [missing] * width])
 
 
-@every_case
 @pytest.mark.parametrize("model", GRIDS)
-def test_grids_follow_the_conventions(model, height, k, max_distance):
-    mesh = mesh_of(model, height, k, max_distance)
-    assert_is_flood_filled(mesh, *GRIDS[model], BALL, height, k, max_distance)
+def test_grids_follow_the_conventions(model):
+    for height, k, max_distance in CASES:
+        mesh = mesh_of(model, height, k, max_distance)
+        assert_is_flood_filled(mesh, *GRIDS[model], BALL, height, k, max_distance)
 
 
 @st.composite
@@ -89,18 +89,18 @@ def test_a_grid_has_no_islands(kind, width, height, k, max_distance):
     assert len(mesh) < sum(near)
 
 
-@every_case
 @pytest.mark.parametrize("model", GRIDS)
-def test_links_of_a_grid_are_mutual(model, height, k, max_distance):
+def test_links_of_a_grid_are_mutual(model):
     """Who is to the left of a point has it to the right, and so in all directions."""
-    mesh = mesh_of(model, height, k, max_distance)
     steps = STEPS[GRIDS[model][1]]
-    points = np.arange(len(mesh))
-    for direction, (right, up) in enumerate(steps):
-        opposite = steps.index((-right, -up))
-        there = mesh.neighbors[:-1, direction]
-        linked = there < len(mesh)
-        np.testing.assert_array_equal(mesh.neighbors[there[linked], opposite], points[linked])
+    for height, k, max_distance in CASES:
+        mesh = mesh_of(model, height, k, max_distance)
+        points = np.arange(len(mesh))
+        for direction, (right, up) in enumerate(steps):
+            opposite = steps.index((-right, -up))
+            there = mesh.neighbors[:-1, direction]
+            linked = there < len(mesh)
+            np.testing.assert_array_equal(mesh.neighbors[there[linked], opposite], points[linked])
 
 
 @pytest.mark.parametrize("model", GRIDS)

@@ -23,7 +23,6 @@ TOO_MANY = (
     r"would have (far too many|[\d,]+) points, and at most 8,000,000 are allowed; choose .*max_distance.*object_radius"
 )
 
-every_case = pytest.mark.parametrize(("height", "k", "max_distance"), CASES)
 twelve_models = pytest.mark.parametrize("model", TWELVE)
 every_model = pytest.mark.parametrize("model", MESH_MODELS)
 
@@ -44,52 +43,54 @@ def test_the_twelve_models_of_the_reference_are_there():
         assert mesh_model(model).neighbors == int(model[-1])
 
 
-@every_case
 @pytest.mark.parametrize("model", RINGS)
-def test_rings_follow_the_conventions(model, height, k, max_distance):
-    mesh = mesh_of(model, height, k, max_distance)
-    rays, neighbors = plain_mesh(BALL, height, k, max_distance, RINGS[model])
-    assert len(mesh) == len(rays)
-    np.testing.assert_allclose(mesh.rays, rays, atol=1e-12)
-    np.testing.assert_array_equal(mesh.neighbors, neighbors)
+def test_rings_follow_the_conventions(model):
+    for height, k, max_distance in CASES:
+        mesh = mesh_of(model, height, k, max_distance)
+        rays, neighbors = plain_mesh(BALL, height, k, max_distance, RINGS[model])
+        assert len(mesh) == len(rays)
+        np.testing.assert_allclose(mesh.rays, rays, atol=1e-12)
+        np.testing.assert_array_equal(mesh.neighbors, neighbors)
 
 
-@every_case
 @twelve_models
-def test_neighbors_are_points_or_the_missing_one(model, height, k, max_distance):
-    mesh = mesh_of(model, height, k, max_distance)
-    assert mesh.neighbors.shape == (len(mesh) + 1, int(model[-1]))
-    assert mesh.neighbors.min() >= 0
-    assert mesh.neighbors.max() == len(mesh)
-    assert (mesh.neighbors[-1] == len(mesh)).all()
+def test_neighbors_are_points_or_the_missing_one(model):
+    for height, k, max_distance in CASES:
+        mesh = mesh_of(model, height, k, max_distance)
+        assert mesh.neighbors.shape == (len(mesh) + 1, int(model[-1]))
+        assert mesh.neighbors.min() >= 0
+        assert mesh.neighbors.max() == len(mesh)
+        assert (mesh.neighbors[-1] == len(mesh)).all()
 
 
-@every_case
 @twelve_models
-def test_meshes_are_connected(model, height, k, max_distance):
+def test_meshes_are_connected(model):
     """From straight below the camera one comes to every point, link by link."""
-    assert reached(mesh_of(model, height, k, max_distance)).all()
+    for height, k, max_distance in CASES:
+        assert reached(mesh_of(model, height, k, max_distance)).all()
 
 
-@every_case
 @twelve_models
-def test_rays_are_unit_vectors_within_the_distance(model, height, k, max_distance):
-    mesh = mesh_of(model, height, k, max_distance)
-    np.testing.assert_allclose(np.linalg.norm(mesh.rays, axis=1), 1.0, atol=1e-12)
-    level = height if model in RINGS else height - BALL.radius
-    assert (level * np.hypot(mesh.rays[:, 0], mesh.rays[:, 1]) <= -mesh.rays[:, 2] * max_distance * (1 + 1e-12)).all()
-    assert len(np.unique(mesh.rays.round(9), axis=0)) == len(mesh)
+def test_rays_are_unit_vectors_within_the_distance(model):
+    for height, k, max_distance in CASES:
+        mesh = mesh_of(model, height, k, max_distance)
+        np.testing.assert_allclose(np.linalg.norm(mesh.rays, axis=1), 1.0, atol=1e-12)
+        level = height if model in RINGS else height - BALL.radius
+        assert (
+            level * np.hypot(mesh.rays[:, 0], mesh.rays[:, 1]) <= -mesh.rays[:, 2] * max_distance * (1 + 1e-12)
+        ).all()
+        assert len(np.unique(mesh.rays.round(9), axis=0)) == len(mesh)
 
 
-@every_case
 @pytest.mark.parametrize("model", RINGS)
-def test_left_and_right_in_a_ring_are_mutual(model, height, k, max_distance):
+def test_left_and_right_in_a_ring_are_mutual(model):
     """Links from ring to ring need not be: their sizes differ."""
-    mesh = mesh_of(model, height, k, max_distance)
-    left, right = mesh.neighbors[:-1, 0], mesh.neighbors[:-1, RINGS[model] // 2]
-    points = np.arange(1, len(mesh))  # the nadir has no left
-    np.testing.assert_array_equal(right[left[points]], points)
-    np.testing.assert_array_equal(left[right[points]], points)
+    for height, k, max_distance in CASES:
+        mesh = mesh_of(model, height, k, max_distance)
+        left, right = mesh.neighbors[:-1, 0], mesh.neighbors[:-1, RINGS[model] // 2]
+        points = np.arange(1, len(mesh))  # the nadir has no left
+        np.testing.assert_array_equal(right[left[points]], points)
+        np.testing.assert_array_equal(left[right[points]], points)
 
 
 @every_model
@@ -110,24 +111,12 @@ def test_an_unknown_model_names_the_nearest(name, nearest):
 
 
 @every_model
-@pytest.mark.parametrize("k", [0.0, -1.0, math.nan, math.inf])
-def test_intersections_that_are_no_number_are_refused(model, k):
-    with pytest.raises(GeometryError, match="intersections"):
-        build_mesh(shape_for(model), 1.0, k, 3.0, model)
-
-
-@every_model
-@pytest.mark.parametrize("max_distance", [0.0, -1.0, math.nan, math.inf])
-def test_distances_that_are_no_length_are_refused(model, max_distance):
-    with pytest.raises(GeometryError, match="distance"):
-        build_mesh(shape_for(model), 1.0, 4.0, max_distance, model)
-
-
-@every_model
-@pytest.mark.parametrize("height", [0.0, -1.0, math.nan, math.inf])
-def test_heights_without_a_mesh_are_refused(model, height):
-    with pytest.raises(GeometryError, match="height"):
-        build_mesh(shape_for(model), height, 4.0, 3.0, model)
+@pytest.mark.parametrize("wrong", ["height", "intersections", "max_distance"])
+def test_numbers_without_a_mesh_are_refused_by_name(model, wrong):
+    for value in (0.0, -1.0, math.nan, math.inf):
+        numbers = {"height": 1.0, "intersections": 4.0, "max_distance": 3.0} | {wrong: value}
+        with pytest.raises(GeometryError, match=wrong.removeprefix("max_")):
+            build_mesh(shape_for(model), *numbers.values(), model)
 
 
 @pytest.mark.parametrize("model", [model for model in MESH_MODELS if model != "wall6"])

@@ -58,6 +58,7 @@ def convolutions(network):
     return sum(layer.kind != "dense" for layer in network.shape.layers)
 
 
+@pytest.mark.long
 @given(st.data(), models, counts, seeds)
 @settings(max_examples=60)
 def test_sectors_give_the_answers_of_the_whole_mesh(others, data, model, count, seed):

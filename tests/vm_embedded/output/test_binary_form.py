@@ -138,6 +138,7 @@ def test_the_layout_of_the_documentation_is_that_of_the_detector(tmp_path):
     assert (found["HEADER"], found["TYPES"], found["NUMBER"]) == (HEADER, RECORDS, LAYOUT)
 
 
+@pytest.mark.long
 def test_a_detector_sends_lines_and_the_binary_form_at_once(tmp_path):
     path = tmp_path / "lines"
     options = ("--camera", "synthetic", "--output-unix", path, "--output-unix-format", "binary")

@@ -107,6 +107,7 @@ def test_lines_also_go_to_a_file_and_by_udp(tmp_path):
     assert message in kept
 
 
+@pytest.mark.long
 def test_what_is_wrong_with_an_output_shows_in_the_state(tmp_path):
     with running(tmp_path, "--camera", "synthetic", "--output-file", "/dev/full") as found:
         found.wait_for_state("degraded")
@@ -114,6 +115,7 @@ def test_what_is_wrong_with_an_output_shows_in_the_state(tmp_path):
         found.stop()
 
 
+@pytest.mark.long
 def test_a_named_pipe_needs_a_reader(tmp_path):
     pipe = tmp_path / "lines.fifo"
     os.mkfifo(pipe)
@@ -139,6 +141,7 @@ def test_a_port_is_a_number_to_65535(port):
         OutputSettings(udp=f"127.0.0.1:{port}")
 
 
+@pytest.mark.long
 def test_a_file_that_was_moved_or_deleted_is_begun_anew(tmp_path):
     path = tmp_path / "lines.jsonl"
     with running(tmp_path, "--camera", "synthetic", "--output-file", path) as found:

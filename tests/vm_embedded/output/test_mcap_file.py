@@ -62,6 +62,7 @@ def test_pictures_detections_and_states_are_in_the_file(tmp_path, scene_folder):
     assert [message.status[0].level for message in found["/diagnostics"]] == [0, 0, 1, 0, 0]
 
 
+@pytest.mark.long
 def test_pictures_of_bayer_patterns_have_colors_in_the_file(tmp_path, scene_folder):
     for path in scene_folder.glob("image*"):
         colors = cv2.imread(str(path))
@@ -73,6 +74,7 @@ def test_pictures_of_bayer_patterns_have_colors_in_the_file(tmp_path, scene_fold
     assert np.abs(picture.astype(float) - colors).mean() < 10.0
 
 
+@pytest.mark.long
 def test_the_file_is_a_bag_with_lens_and_poses(tmp_path, scene_folder):
     path = tmp_path / "out.mcap"
     first = lines(run(scene_folder, "--save-mcap", path))
@@ -83,6 +85,7 @@ def test_the_file_is_a_bag_with_lens_and_poses(tmp_path, scene_folder):
             assert np.abs(np.subtract(each["position"], found["position"])).max() < 0.02  # the pictures are JPEG
 
 
+@pytest.mark.long
 def test_each_lens_and_pose_of_the_demo_is_read_back(tmp_path):
     """Of all projections, with and without distortion, also where a jump of one camera would be impossible."""
     done = run(DEMO, "--save-mcap", tmp_path / "out.mcap")
@@ -126,6 +129,7 @@ def test_all_features_are_in_the_file(tmp_path):
     assert all(count[kind] for kind in range(7)), count
 
 
+@pytest.mark.long
 def test_the_stamps_of_a_bag_stay(tmp_path):
     bag = Scene(count=3).write_bag(tmp_path / "bag")
     run(bag, "--save-mcap", tmp_path / "out.mcap")
@@ -143,6 +147,7 @@ def test_the_stamps_of_a_bag_stay(tmp_path):
     assert len(stamps[0]) == 3
 
 
+@pytest.mark.long
 def test_frames_before_an_interrupt_are_in_the_file(tmp_path):
     Scene(count=40).write_frames(tmp_path / "frames")
     path = tmp_path / "out.mcap"
@@ -169,6 +174,7 @@ def test_frames_before_an_interrupt_are_in_the_file(tmp_path):
     assert count <= len(messages_of(path)["/vm_ros/detections_3d"]) <= count + 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.999])
 def test_a_full_disk_is_named_and_the_old_file_stays(share, tmp_path, scene_folder):
     """At the start, in a frame, and at the end, when the index is written."""
@@ -213,6 +219,7 @@ def test_other_things_beside_the_file_stay_and_do_not_matter(tmp_path, scene_fol
     assert sorted(tmp_path.iterdir()) == [scene_folder, path, link, tmp_path / "out.mcap.part"]
 
 
+@pytest.mark.long
 def test_a_killed_run_does_not_block_the_next(tmp_path, scene_folder):
     path = tmp_path / "out.mcap"
     process = subprocess.Popen(
@@ -230,6 +237,7 @@ def test_a_killed_run_does_not_block_the_next(tmp_path, scene_folder):
     assert {each.name for each in tmp_path.iterdir()} == {"frames", "out.mcap", *left}
 
 
+@pytest.mark.long
 def test_of_two_runs_into_one_file_each_is_whole(tmp_path, scene_folder):
     path = tmp_path / "out.mcap"
     command = [COMMAND, scene_folder, "--save-mcap", path]

@@ -35,6 +35,7 @@ def test_a_recording_is_detected_in_again_bit_by_bit(tmp_path):
     assert any(each["detections"] for each in again)
 
 
+@pytest.mark.long
 def test_a_recording_with_an_own_network_is_read_on_another_machine(tmp_path):
     model, kept = tmp_path / "mine.onnx", tmp_path / "recordings"
     shutil.copy(MODEL, model)
@@ -99,6 +100,7 @@ def test_a_detector_that_is_stopped_finishes_its_recording(tmp_path):
     assert count_found(folder) == promised
 
 
+@pytest.mark.long
 def test_a_killed_detector_leaves_a_recording_that_is_read(tmp_path):
     kept = tmp_path / "recordings"
     with running(tmp_path, "--camera", "synthetic", *LARGE, "--recorder-folder", kept) as found:
@@ -166,6 +168,7 @@ def test_a_recording_larger_than_its_limit_keeps_its_first_frames(tmp_path):
     assert f"only {written} of {promised} frames: it is larger than [recorder] disk_mib, 5 MiB" in event["folder"]
 
 
+@pytest.mark.long
 def test_a_recording_that_can_not_be_written_is_refused(tmp_path):
     kept = tmp_path / "recordings"
     kept.touch()
@@ -179,6 +182,7 @@ def test_a_recording_that_can_not_be_written_is_refused(tmp_path):
     assert "Not a directory" in done.stderr
 
 
+@pytest.mark.long
 def test_a_recording_that_a_class_triggers_and_that_can_not_be_written_is_logged_once_per_pause(tmp_path):
     kept = tmp_path / "recordings"
     kept.touch()

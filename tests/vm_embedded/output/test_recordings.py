@@ -157,6 +157,7 @@ def test_a_left_recording_never_replaces_another(tmp_path):
     assert dict(finish_left_recordings(tmp_path)).pop(tmp_path / NAMES[1]) == 1
 
 
+@pytest.mark.long
 def test_a_detector_deletes_old_recordings_with_dangling_links_and_reports_the_new_one_as_complete(tmp_path):
     kept = tmp_path / "recordings"
     for name in NAMES:
@@ -176,6 +177,7 @@ def test_a_detector_deletes_old_recordings_with_dangling_links_and_reports_the_n
     assert NAMES[2] not in names(kept)
 
 
+@pytest.mark.long
 def test_a_detector_that_starts_takes_no_recording_for_a_left_one(tmp_path):
     """It looks for left recordings while another one begins some in the same folder."""
     done = threading.Event()

@@ -86,6 +86,7 @@ def test_a_ball_is_in_its_place_while_the_camera_turns_fast(tmp_path):
     print(f"{100 * error:.2f} % of the distance")
 
 
+@pytest.mark.long
 def test_poses_that_stop_are_stale_and_nothing_is_reported(tmp_path):
     path = tmp_path / "poses"
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"unix:{path}") as found:
@@ -161,6 +162,7 @@ def test_ten_thousand_bad_poses_change_nothing(tmp_path):
         assert found.stop()[0] == 0
 
 
+@pytest.mark.long
 def test_what_the_line_of_a_pose_lacks_is_said_in_the_state(tmp_path):
     port = free_port()
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
@@ -170,6 +172,7 @@ def test_what_the_line_of_a_pose_lacks_is_said_in_the_state(tmp_path):
         found.stop()
 
 
+@pytest.mark.long
 def test_a_long_line_on_standard_input_is_left_out_and_the_next_one_is_read(tmp_path):
     with running(tmp_path, "--camera", "synthetic", "--pose-source", "stdin", stdin=subprocess.PIPE) as found:
         found.wait_for_state("pose_stale")
@@ -183,6 +186,7 @@ def test_a_long_line_on_standard_input_is_left_out_and_the_next_one_is_read(tmp_
         found.stop()
 
 
+@pytest.mark.long
 def test_attack_12_a_pose_in_the_future_is_refused_and_blocks_no_good_one(tmp_path):
     port = free_port()
     source = ("--camera", f"synthetic:{TURN}", "--pose-source", f"udp:127.0.0.1:{port}")
@@ -224,6 +228,7 @@ def test_a_wait_before_a_pose_is_read_does_not_move_its_wall_time(monkeypatch):
     assert poses.poses.newest == pytest.approx(100.0, abs=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("flood", [b"x\n", b"\n", b'{"t": 1.0, "height": 0.8, "quaternion": [1, 0, 0, 0]}\n'])
 def test_a_client_that_floods_the_pose_socket_stops_nothing(flood, tmp_path):
     path = tmp_path / "poses"
@@ -251,6 +256,7 @@ def send_until_closed(connection, block):
             connection.sendall(block)
 
 
+@pytest.mark.long
 def test_a_datagram_of_many_lines_is_cut_off(tmp_path):
     port = free_port()
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"udp:127.0.0.1:{port}") as found:
@@ -265,6 +271,7 @@ def test_a_datagram_of_many_lines_is_cut_off(tmp_path):
         found.stop()
 
 
+@pytest.mark.long
 def test_another_reason_of_the_same_state_is_logged_but_not_another_number_in_it(tmp_path):
     path = tmp_path / "poses"
 
@@ -287,6 +294,7 @@ def test_another_reason_of_the_same_state_is_logged_but_not_another_number_in_it
     assert found.states[found.states.index("pose_stale") :] == ["pose_stale", "stopping"]
 
 
+@pytest.mark.long
 def test_a_bad_state_with_another_reason_is_sent_while_frames_arrive(tmp_path):
     path = tmp_path / "poses"
     with running(tmp_path, "--camera", "synthetic", "--pose-source", f"unix:{path}") as found:

@@ -73,6 +73,7 @@ def test_draws_are_all_different():
         assert all(np.abs(texture - other).mean() > 1e-3 for other in textures[:i])
 
 
+@pytest.mark.long
 def test_white_shares_span_all():
     shares = np.array([white_share(design, 32) for design in designs(400)])
     assert (shares < 0.05).mean() > 0.1

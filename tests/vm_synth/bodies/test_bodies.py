@@ -127,6 +127,7 @@ def test_pedestal_is_flat_at_its_height(seed: int) -> None:
     assert (np.abs(top[:, :2]).max(axis=0) > 0.099).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", CARRIERS)
 def test_own_body_keeps_clear_of_the_camera(kind: str) -> None:
     for height in (each for each in HEIGHTS if each >= LOWEST[kind]):

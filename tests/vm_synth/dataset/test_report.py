@@ -216,6 +216,7 @@ def test_tables_keep_numbers_with_their_names(folder):
     assert "\xa0" not in tables(inspect(folder))
 
 
+@pytest.mark.long
 def test_plots_and_json_are_written(folder, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     plots, report = tmp_path / "plots.png", tmp_path / "report.json"
@@ -227,6 +228,7 @@ def test_plots_and_json_are_written(folder, tmp_path, capsys):
     assert main(["check", str(folder), "--quick", "--plots", str(tmp_path / "quick.svg")]) == 0
 
 
+@pytest.mark.long
 def test_plots_without_any_ball(tmp_path):
     pytest.importorskip("matplotlib")
     without = [index for index in range(40) if scene_of(index).ball is None][:2]

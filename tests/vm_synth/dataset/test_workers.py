@@ -16,6 +16,8 @@ from vm_embedded.errors import InputError
 from vm_synth.dataset.files import PARTS, file_of, indices_in
 from vm_synth.render.mitsuba import load_mitsuba
 
+pytestmark = pytest.mark.long
+
 SMALL = """
 [camera]
 picture_width = 128
@@ -82,13 +84,11 @@ def test_a_set_has_all_parts_of_all_pictures(whole):
     assert [each["index"] for each in truth] == list(range(6))
 
 
-@pytest.mark.long
 def test_two_workers_make_the_same_bytes(tmp_path, small, whole):
     assert run(tmp_path, [*small, "--workers", "2"]).returncode == 0
     assert contents(tmp_path) == whole
 
 
-@pytest.mark.long
 def test_shards_join_to_the_same_set(tmp_path, small, whole):
     joined = {}
     for shard in ("1/2", "2/2"):
@@ -98,9 +98,7 @@ def test_shards_join_to_the_same_set(tmp_path, small, whole):
     assert joined == whole
 
 
-@pytest.mark.parametrize(
-    "how", [signal.SIGINT, *(pytest.param(each, marks=pytest.mark.long) for each in (signal.SIGTERM, signal.SIGKILL))]
-)
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_what_is_stopped_goes_on_with_the_same_command(how, tmp_path, small, whole):
     arguments = [*COMMAND, str(tmp_path), *small, "--workers", "1"]
     process = started(arguments)
@@ -142,7 +140,6 @@ def wait_for_end_of(group):
         time.sleep(0.05)
 
 
-@pytest.mark.long
 def test_a_killed_worker_is_reported_in_one_line_and_nothing_is_lost(tmp_path, small, whole):
     arguments = [*COMMAND, str(tmp_path), *small, "--workers", "1"]
     process = started(arguments)
@@ -161,7 +158,6 @@ def children(pid):
     return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-@pytest.mark.long
 def test_a_full_disk_ends_in_one_line_and_can_be_continued(tmp_path, small, whole):
     """A limit on the size of files stands for the disk: writing fails in the middle of an image."""
     limited = ["bash", "-c", 'ulimit -f 2; exec "$@"', "bash", *COMMAND, str(tmp_path), *small, "--workers", "1"]
@@ -190,7 +186,6 @@ def test_a_folder_of_other_pictures_is_left_alone(tmp_path, small, whole):
     assert contents(tmp_path) == {"image0000001.jpg": b"mine"}
 
 
-@pytest.mark.long
 def test_pictures_that_lost_a_file_are_rendered_again(tmp_path, small, whole):
     for name, content in whole.items():
         (tmp_path / name).write_bytes(content)

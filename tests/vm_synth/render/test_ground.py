@@ -78,6 +78,7 @@ def test_the_area_of_lines_is_the_same_for_coarse_pixels():
         assert area_of_lines(its, step) == pytest.approx(fine, rel=0.04)
 
 
+@pytest.mark.long
 @given(reals(-math.pi, math.pi), reals(-2.0, 2.0), reals(-2.0, 2.0))
 @settings(max_examples=15)
 def test_a_field_is_turned_and_moved_as_a_whole(heading, x, y):
@@ -203,6 +204,7 @@ looks = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.long
 @given(looks, reals(-10.0, 60.0), reals(0.05, 3.0))
 @settings(max_examples=20)
 def test_all_looks_are_albedos_and_shares(changes, pitch, height):

@@ -20,11 +20,11 @@ from vm_synth.scene.configuration import CLASSES, SceneConfiguration
 from vm_synth.scene.maps import MapRanges
 
 DEFAULT = SceneConfiguration()
-ENTRIES = [
-    pytest.param(section.name, entry, id=f"{section.name}.{entry.name}")
+ENTRIES = {
+    f"{section.name}.{entry.name}": (section.name, entry)
     for section in fields(DEFAULT)
     for entry in fields(getattr(DEFAULT, section.name))
-]
+}
 
 
 def kind_of(entry):
@@ -38,9 +38,10 @@ def kind_of(entry):
     return "number"
 
 
-RANGES = [each for each in ENTRIES if kind_of(each.values[1]) == "range"]
-NUMBERS = [each for each in ENTRIES if kind_of(each.values[1]) == "number"]
-NAMES = [each for each in ENTRIES if kind_of(each.values[1]) == "names"]
+RANGES, NUMBERS, NAMES = (
+    [(section, entry) for section, entry in ENTRIES.values() if kind_of(entry) == kind]
+    for kind in ("range", "number", "names")
+)
 
 
 @pytest.fixture(scope="module")
@@ -124,12 +125,12 @@ def test_every_entry_is_documented_by_a_line_of_its_own():
         assert all(line.startswith("# ") and len(line) > 4 for line in own[::2])
 
 
-@pytest.mark.parametrize(("section", "entry"), ENTRIES)
-def test_every_entry_says_what_it_is(section, entry):
-    text = entry.metadata["help"]
-    assert len(text) > 4
-    assert text == text.strip()
-    assert not text.endswith(".")
+def test_every_entry_says_what_it_is():
+    for _, entry in ENTRIES.values():
+        text = entry.metadata["help"]
+        assert len(text) > 4
+        assert text == text.strip()
+        assert not text.endswith(".")
 
 
 UNITS = {
@@ -144,7 +145,7 @@ UNITS = {
 
 
 def test_lengths_and_angles_have_a_unit():
-    units = {each.id: each.values[1].metadata["unit"] for each in ENTRIES if "unit" in each.values[1].metadata}
+    units = {name: entry.metadata["unit"] for name, (_, entry) in ENTRIES.items() if "unit" in entry.metadata}
     for unit, names in UNITS.items():
         assert {name for name, its in units.items() if its == unit} == set(names.split())
 
@@ -156,12 +157,12 @@ def test_the_unit_and_the_limits_are_documented():
     assert lines[lines.index('off_plane_label = "environment"') - 1].endswith(f"; allowed: {', '.join(CLASSES)}")
 
 
-@pytest.mark.parametrize(("section", "entry"), RANGES + NUMBERS)
-def test_defaults_are_within_finite_limits(section, entry):
-    low, high = entry.metadata["limits"]
-    assert math.isfinite(low)
-    assert math.isfinite(high)
-    assert all(low <= each <= high for each in np.atleast_1d(entry.default))
+def test_defaults_are_within_finite_limits():
+    for _, entry in RANGES + NUMBERS:
+        low, high = entry.metadata["limits"]
+        assert math.isfinite(low)
+        assert math.isfinite(high)
+        assert all(low <= each <= high for each in np.atleast_1d(entry.default))
 
 
 def test_what_things_count_as_are_classes():
@@ -179,7 +180,7 @@ def test_the_shipped_configuration_is_readable_and_says_only_what_is_known_of_ma
 
 @given(st.data())
 def test_a_range_is_taken_anywhere_within_its_limits(write, data):
-    section, entry = data.draw(st.sampled_from(RANGES)).values
+    section, entry = data.draw(st.sampled_from(RANGES))
     low, high = data.draw(values_of(entry))
     found = read_sections(SceneConfiguration, write(f"[{section}]\n{entry.name} = [{low!r}, {high!r}]\n"))
     assert getattr(getattr(found, section), entry.name) == (low, high)
@@ -200,35 +201,37 @@ def refused(write, section, name, value):
 BAD_RANGES = ["3", "true", '"0 to 1"', "[]", "[0.5]", "[0.5, 0.5, 0.5]", "{}", "[true, true]", '["a", "b"]']
 
 
-@pytest.mark.parametrize(("section", "entry"), RANGES)
-def test_a_bad_range_is_refused_by_entry(write, section, entry):
-    low, high = entry.metadata["limits"]
-    for value in (*BAD_RANGES, f"[{low}, nan]", f"[nan, {high}]", f"[{low}, inf]", f"[-inf, {high}]"):
-        assert refused(write, section, entry.name, value).startswith(f"{entry.name} must be ")
-    for value in (f"[{low}, {high + 1}]", f"[{low - 1}, {high}]"):
-        assert f"from {low:g} to {high:g}" in refused(write, section, entry.name, value)
-    assert f"{high:g} is above {low:g}" in refused(write, section, entry.name, f"[{high}, {low}]")
+def test_bad_ranges_are_refused_by_entry(write):
+    for section, entry in RANGES:
+        low, high = entry.metadata["limits"]
+        for value in (*BAD_RANGES, f"[{low}, nan]", f"[nan, {high}]", f"[{low}, inf]", f"[-inf, {high}]"):
+            assert refused(write, section, entry.name, value).startswith(f"{entry.name} must be ")
+        for value in (f"[{low}, {high + 1}]", f"[{low - 1}, {high}]"):
+            assert f"from {low:g} to {high:g}" in refused(write, section, entry.name, value)
+        assert f"{high:g} is above {low:g}" in refused(write, section, entry.name, f"[{high}, {low}]")
 
 
-@pytest.mark.parametrize(("section", "entry"), NUMBERS)
-def test_a_bad_number_is_refused_by_entry(write, section, entry):
-    low, high = entry.metadata["limits"]
-    bad = ["true", "false", '"1"', "[1, 1]", "nan", "inf", "-inf", f"{low - 1}", f"{high + 1}", "9" * 400]
-    for value in bad + ["100.0", "100.5"] * whole(entry):
-        message = refused(write, section, entry.name, value)
-        assert message.startswith(f"{entry.name} must be a {'whole ' if whole(entry) else ''}number from {low:g}")
-        assert message.endswith(f"not {tomllib.loads(f'v = {value}')['v']!r}")
+def test_bad_numbers_are_refused_by_entry(write):
+    for section, entry in NUMBERS:
+        low, high = entry.metadata["limits"]
+        bad = ["true", "false", '"1"', "[1, 1]", "nan", "inf", "-inf", f"{low - 1}", f"{high + 1}", "9" * 400]
+        for value in bad + ["100.0", "100.5"] * whole(entry):
+            message = refused(write, section, entry.name, value)
+            assert message.startswith(f"{entry.name} must be a {'whole ' if whole(entry) else ''}number from {low:g}")
+            assert message.endswith(f"not {tomllib.loads(f'v = {value}')['v']!r}")
 
 
-@pytest.mark.parametrize(("section", "entry"), NAMES)
-def test_bad_names_are_refused_by_entry(write, section, entry):
-    first = entry.metadata["allowed"][0]
-    for value in ("[]", f'"{first}"', "3", "true", "{}"):
-        assert refused(write, section, entry.name, value).startswith(f"{entry.name} must be a list of some of {first}")
-    for value in ("[3]", "[true]", "[[]]"):
-        assert refused(write, section, entry.name, value).startswith(f"unknown {entry.name} ")
-    message = refused(write, section, entry.name, f'["{first}x"]')
-    assert f"did you mean {first!r}?" in message or first.isupper()
+def test_bad_names_are_refused_by_entry(write):
+    for section, entry in NAMES:
+        first = entry.metadata["allowed"][0]
+        for value in ("[]", f'"{first}"', "3", "true", "{}"):
+            assert refused(write, section, entry.name, value).startswith(
+                f"{entry.name} must be a list of some of {first}"
+            )
+        for value in ("[3]", "[true]", "[[]]"):
+            assert refused(write, section, entry.name, value).startswith(f"unknown {entry.name} ")
+        message = refused(write, section, entry.name, f'["{first}x"]')
+        assert f"did you mean {first!r}?" in message or first.isupper()
 
 
 MESSAGES = {

@@ -185,6 +185,7 @@ def distances_to_lines(field, spot):
     return np.linalg.norm(start + share[:, None] * along - spot, axis=1)
 
 
+@pytest.mark.long
 def test_something_touches_the_ball_without_passing_through_it():
     touched = 0
     for scene in scenes(30, bare(touched=1.0, distance=(0.8, 3.0))):

@@ -72,6 +72,7 @@ def test_the_camera_sees_the_middle_of_every_object(many):
             assert -1.0 <= y <= scene.size[1]
 
 
+@pytest.mark.long
 def test_other_sizes_are_no_objects(ranges):
     always = replace(ranges, object=replace(ranges.object, wrong_size=1.0))
     found = [scene for scene in scenes(20, always) if f"other {ranges.object.name}" in scene.names]

@@ -54,6 +54,7 @@ def test_textures_are_albedo(seed):
     assert 0.0 < texture.min() <= texture.max() < 1.0
 
 
+@pytest.mark.long
 def test_all_kinds_of_textures_are_drawn():
     spread = [draw_texture(np.random.default_rng(seed)).std(axis=(0, 1)).max() for seed in range(30)]
     assert min(spread) < 0.02 < max(spread)

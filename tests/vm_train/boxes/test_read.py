@@ -47,6 +47,7 @@ pictures = st.dictionaries(
 ).filter(lambda found: any(found.values()))  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("beside", [True, False], ids=["beside", "apart"])
 @pytest.mark.parametrize("format", FORMATS)
 @settings(max_examples=15)
@@ -207,6 +208,7 @@ def test_lenses_beside_images_are_found(tmp_path):
     assert second.startswith("lens3.yaml: ")
 
 
+@pytest.mark.long
 def test_the_real_frames(shared):
     for part, frames, balls in (("train", 359, 366), ("test", 173, 130)):
         found = read_boxes(shared / "boxes" / part, names={"0": "ball", "1": "robot"})

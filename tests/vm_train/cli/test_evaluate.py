@@ -275,6 +275,7 @@ def test_files_of_others_stay(capsys, data, tmp_path, name):
     assert contents(tmp_path) == {f"out/{name}": b"[1, 2]"}
 
 
+@pytest.mark.long
 def test_an_interrupt_ends_it_with_130_and_writes_nothing(data, tmp_path):
     folder = draw_set(tmp_path / "set", 1)
     for name in ("image.jpg", "mask.png", "lens.yaml", "scene.json"):

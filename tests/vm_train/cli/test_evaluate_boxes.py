@@ -82,6 +82,7 @@ def test_without_lens_the_close_look_is_scored(without_lenses, tmp_path):
     assert scores["networks"][0]["scores"]["all"]["found"] >= 1
 
 
+@pytest.mark.long
 def test_a_frame_without_pose_among_others_is_told(boxes, tmp_path):
     folder = shutil.copytree(boxes, tmp_path / "some")
     min(folder.glob("lens*")).unlink()

@@ -32,6 +32,7 @@ def calibrate(*arguments):
     return main(["calibrate", *map(str, arguments), "--radius-of", "scene"])
 
 
+@pytest.mark.long
 def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp_path, capsys):
     shipped = model_path("ball-small")
     change_looks(shipped, tmp_path / "unsure.onnx", [look_of(read_model(shipped)).recalibrated(0.6, 0.3, "no picture")])
@@ -52,6 +53,7 @@ def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp
     assert again == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_objects_of_another_size_and_a_calibration_that_does_not_help_are_told(data, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(Calibration, "fit", lambda logits, right: Calibration(1.0, 0.0))
     assert main(["calibrate", "ball-small", str(data), "-o", str(tmp_path / "own.onnx")]) == 0
@@ -60,6 +62,7 @@ def test_objects_of_another_size_and_a_calibration_that_does_not_help_are_told(d
     assert "class ball: the error is not smaller than before: give more pictures" in said
 
 
+@pytest.mark.long
 def test_a_canary_that_is_not_found_any_more_is_a_warning(data, tmp_path, capsys):
     """Most balls of these masks are said to be field, so the network becomes unsure of all balls."""
     shutil.copytree(data, tmp_path / "data")

@@ -119,6 +119,7 @@ def test_entries_without_effect_and_wrong_widths_are_refused(entry, said, data, 
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 def test_pictures_that_leave_bases_unknown_are_a_remark(data, tmp_path):
     shutil.copytree(data, tmp_path / "data")
     for scene in sorted((tmp_path / "data").glob("scene*.json"))[:4]:

@@ -40,6 +40,7 @@ def test_an_empty_part_is_named(data, configuration, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -108,6 +109,7 @@ def test_the_preview_is_a_picture(data, configuration, tmp_path):
     assert (tmp_path / "sheet.jpg").stat().st_size > 10000
 
 
+@pytest.mark.long
 def test_a_configuration_can_be_written_and_used(data, tmp_path):
     (tmp_path / "train.toml").write_text(run("config").stdout)
     done = run("check", data, "--config", tmp_path / "train.toml")

@@ -20,6 +20,8 @@ from vm_export.checkpoint import Checkpoint
 from vm_train.runs.log import read_log
 from vm_train.runs.run import locked
 
+pytestmark = pytest.mark.long
+
 VALIDATION = "validation_average_precision"
 
 
@@ -72,7 +74,6 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, data):
     assert [each.name for each in checkpoint.manifest.classes] == ["ball", "line", "field", "environment"]
 
 
-@pytest.mark.long
 def test_at_a_terminal_the_bar_shows_epoch_loss_and_validation(data, configuration, tmp_path):
     main, terminal = pty.openpty()
     command = [*COMMAND, data, "-o", tmp_path / "run", "--config", configuration]
@@ -106,7 +107,6 @@ def test_its_network_is_exported_with_its_provenance(whole, tmp_path):
     assert made.provenance["selection"] == "hard"
 
 
-@pytest.mark.long
 def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp_path):
     run(data, "-o", tmp_path / "run", "--config", configuration, "--workers", 0, "--threads", 1, "--no-unpacked")
     assert same_network(tmp_path / "run" / "model.pt", whole[0] / "model.pt")
@@ -116,10 +116,10 @@ def test_the_same_command_gives_the_same_weights(whole, data, configuration, tmp
 @pytest.mark.parametrize(
     ("how", "steps"),
     [
-        pytest.param(signal.SIGINT, 2, marks=pytest.mark.long),
-        pytest.param(signal.SIGTERM, 9, marks=pytest.mark.long),
+        (signal.SIGINT, 2),
+        (signal.SIGTERM, 9),
         (signal.SIGKILL, 9),
-        pytest.param(signal.SIGKILL, 24, marks=pytest.mark.long),
+        (signal.SIGKILL, 24),
     ],
 )
 def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, whole, data, configuration, tmp_path):
@@ -131,7 +131,6 @@ def test_what_is_stopped_at_any_moment_ends_with_the_same_weights(how, steps, wh
     assert (folder / "log.jsonl").read_text() == (whole[0] / "log.jsonl").read_text()
 
 
-@pytest.mark.long
 def test_a_reader_that_leaves_loses_no_training(data, configuration, tmp_path):
     """As in vm-train DATA -o RUN | head -1: no traceback, and the training is finished or can be resumed."""
     folder = tmp_path / "run"
@@ -149,7 +148,6 @@ def test_a_reader_that_leaves_loses_no_training(data, configuration, tmp_path):
     assert (folder / "model.pt").exists()
 
 
-@pytest.mark.long
 def test_two_processes_have_the_same_loss_curve_on_imported_pictures(whole, data, configuration, tmp_path):
     subprocess.run(["tar", "-cf", tmp_path / "data.tar", "-C", data.parent, data.name], check=True)
     unpacked = tmp_path / "data"
@@ -175,7 +173,6 @@ def test_two_processes_have_the_same_loss_curve_on_imported_pictures(whole, data
     assert scores[1] == pytest.approx(scores[0], abs=0.02)
 
 
-@pytest.mark.long
 def test_a_finished_training_says_so_and_a_begun_one_is_not_begun_again(whole, data, configuration):
     folder, _ = whole
     assert "finished already" in run("resume", folder).stdout
@@ -187,7 +184,6 @@ def copied(whole, tmp_path):
     return Path(shutil.copytree(whole[0], tmp_path / "run"))
 
 
-@pytest.mark.long
 def test_a_configuration_that_was_edited_is_refused(whole, tmp_path):
     folder = copied(whole, tmp_path)
     path = folder / "train.toml"
@@ -224,7 +220,6 @@ def test_files_of_others_are_not_written_over(data, configuration, tmp_path):
     assert (tmp_path / "train.toml").read_text().startswith("# mine")
 
 
-@pytest.mark.long
 def test_a_training_goes_on_where_its_folders_were_moved_to(whole, data, tmp_path):
     folder = copied(whole, tmp_path)
     (folder / "state.pt").unlink()
@@ -237,7 +232,6 @@ def test_a_training_goes_on_where_its_folders_were_moved_to(whole, data, tmp_pat
     assert contents(folder / "unpacked") == {"own.raw": b"camera"}
 
 
-@pytest.mark.long
 def test_a_damaged_log_is_cut_where_it_is_damaged(whole, tmp_path):
     folder = copied(whole, tmp_path)
     (folder / "state.pt").unlink()

@@ -127,6 +127,7 @@ def test_context_gives_no_gradient_but_is_seen():
     assert same({name: after[name] for name in before}, before)
 
 
+@pytest.mark.long
 def test_it_learns_where_objects_are():
     """Their cells, the way to them, and their sizes, from colors that tell all three."""
     made = Trainer(

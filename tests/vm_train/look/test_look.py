@@ -245,6 +245,7 @@ def test_a_loss_that_is_no_number_ends_the_training(look, tmp_path):
     assert len(done.stderr.splitlines()) == 1
 
 
+@pytest.mark.long
 def test_behind_a_look_with_a_glance_a_wide_look_is_trained(whole, look, tmp_path):
     before = LookCheckpoint.load(whole[0] / "look.pt")
     before = replace(before, contract=replace(before.contract, glance=before.contract), glance=before)

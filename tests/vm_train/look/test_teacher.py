@@ -30,6 +30,7 @@ def test_a_target_is_between_the_label_and_the_answer_of_the_teacher(shares, see
     torch.testing.assert_close(wanted, part * answers + (1.0 - part) * shown)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_patches_with_a_teacher_keep_their_answers_whatever_their_labels_say(share):
     first = trainer(recipe=LookRecipe(batch=24, rate=0.02), total=150)

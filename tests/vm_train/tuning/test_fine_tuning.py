@@ -92,6 +92,7 @@ def test_the_new_model_differs_only_in_its_close_look(whole):
     assert CloseLook.of(after).glance is not None  # loads, and passes its self-tests
 
 
+@pytest.mark.long
 def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_be_tried(tune, frames, tmp_path):
     seen = shutil.copytree(frames, tmp_path / "seen")
     lens = draw_set(tmp_path / "drawn", 1) / "lens0000.yaml"

@@ -1,6 +1,6 @@
 """Detections and states as messages of ROS: vision_msgs 4 (ROS 2 Humble and later) and diagnostic_msgs.
 
-`types` is a set of message classes that are called with all their fields: of rclpy, of vm_ros, or of rosbags.
+`types` is a set of message classes that are called with all their fields: of vm_ros or of rosbags.
 """
 
 from __future__ import annotations

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from ...arrays import Floats
 from ...detection.detection import Detection
-from ...field.features import Crossing, FieldFeatures, Upright
+from ...field.features import Crossing, FieldFeatures, Segment, Upright
 from .detection_messages import FrameResults, box_around, object_box
 
 _LEFT, _RIGHT = 1, 2
@@ -171,14 +172,18 @@ def markings_in_image(frame: FrameResults, field: FieldFeatures) -> Any:
         intersections=_intersections_in_image(frame, field),
         segments=[
             types.MarkingSegment2D(
-                start=_pixel(types, each.pixels[0]),
-                end=_pixel(types, each.pixels[1]),
-                confidence=_confidence(types, each.confidence),
+                start=_pixel(types, start), end=_pixel(types, end), confidence=_confidence(types, each.confidence)
             )
-            for each in field.lines
-            if not np.isnan(each.pixels).any()
+            for each, (start, end) in zip(field.lines, _ends(field.lines), strict=True)
+            if not math.isnan(sum(start) + sum(end))
         ],
     )
+
+
+def _ends(lines: Sequence[Segment]) -> list[list[list[float]]]:
+    """The pixels of the two ends of each line."""
+    found: list[list[list[float]]] = np.array([each.pixels for each in lines]).reshape(-1, 2, 2).tolist()
+    return found
 
 
 def _ellipses_in_image(frame: FrameResults, field: FieldFeatures) -> list[Any]:
@@ -196,12 +201,14 @@ def _ellipses_in_image(frame: FrameResults, field: FieldFeatures) -> list[Any]:
 def _intersections_in_image(frame: FrameResults, field: FieldFeatures) -> list[Any]:
     """MarkingIntersections that the lens sees; their headings are from 0 to 2 pi [rad], and ascend."""
     types, crossings = frame.types, field.crossings
-    steps = [np.array([(0.0, 0.0), *rays_of(each)]) for each in crossings]
-    places = [_STEP * step + each.position for step, each in zip(steps, crossings, strict=True)]
-    pixels = _pixels_of(frame, np.concatenate([np.empty((0, 2)), *places]))
+    directions, places = [rays_of(each) for each in crossings], []
+    for each, rays in zip(crossings, directions, strict=True):
+        x, y = each.position.tolist()
+        places += [(x, y), *((x + _STEP * east, y + _STEP * north) for east, north in rays)]
+    pixels = iter(_pixels_of(frame, np.array(places).reshape(-1, 2)).tolist())
     made = []
-    for each, step in zip(crossings, steps, strict=True):
-        (center, *ends), pixels = pixels[: len(step)].tolist(), pixels[len(step) :]
+    for each, rays in zip(crossings, directions, strict=True):
+        center, *ends = islice(pixels, 1 + len(rays))
         if math.isnan(sum(center)):
             continue
         headings = [math.atan2(y - center[1], x - center[0]) % math.tau for x, y in ends if not math.isnan(x)]

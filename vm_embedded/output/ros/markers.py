@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ _POST_HEIGHT, _ROBOT_SIZE, _RAY, _STROKE = 1.2, (0.3, 0.3, 0.6), 0.25, 0.05  # [
 
 
 def marker_array(frame: FrameResults) -> Any:
-    """A MarkerArray of all that a frame shows, with one marker for each kind of thing: markers are slow to send.
+    """A MarkerArray of all that a frame shows, with one marker for each kind of thing: markers have many fields.
 
     Its first marker deletes those of the frame before.
     """
@@ -36,11 +35,10 @@ def marker_array(frame: FrameResults) -> Any:
     field = frame.detections.field
     if field is not None:
         posts, robots = _places(field.posts), _places(field.robots)
-        standing = np.repeat(np.pad(posts, ((0, 0), (0, 1))), 2, axis=0)
+        standing = np.repeat(_raised(posts, 0.0), 2, axis=0)
         standing[1::2, 2] = _POST_HEIGHT
         drawn.add("posts", _LINE_LIST, _POST, (2.0 * _STROKE, 0.0, 0.0), standing)
-        robots = np.pad(robots, ((0, 0), (0, 1)), constant_values=0.5 * _ROBOT_SIZE[2])
-        drawn.add("robots", _CUBE_LIST, _ROBOT, _ROBOT_SIZE, robots)
+        drawn.add("robots", _CUBE_LIST, _ROBOT, _ROBOT_SIZE, _raised(robots, 0.5 * _ROBOT_SIZE[2]))
         stroke = (_STROKE, 0.0, 0.0)
         drawn.add("lines", _LINE_LIST, _LINE, stroke, np.array([each.ends for each in field.lines]).reshape(-1, 2))
         if field.circle is not None:
@@ -53,6 +51,11 @@ def marker_array(frame: FrameResults) -> Any:
 
 def _places(things: Any, width: int = 2) -> Floats:
     return np.array([each.position for each in things]).reshape(-1, width)
+
+
+def _raised(places: Floats, height: float) -> Floats:
+    """Places (n, 3) above others (n, 2) on the plane [m]."""
+    return np.column_stack([places, np.full(len(places), height)])
 
 
 def _rays(crossings: Sequence[Crossing]) -> Floats:
@@ -69,30 +72,44 @@ class _Drawing:
     def __init__(self, frame: FrameResults) -> None:
         types = frame.types
         self._frame = frame
-        first = types.Marker(
-            header=frame.on_plane,
-            ns="",
-            id=0,
-            type=0,
-            action=_DELETE_ALL,
-            pose=types.Pose(
+        self._common = {
+            "header": frame.on_plane,
+            "id": 0,
+            "pose": types.Pose(
                 position=types.Point(x=0.0, y=0.0, z=0.0), orientation=types.Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
             ),
-            scale=types.Vector3(x=0.0, y=0.0, z=0.0),
-            color=types.ColorRGBA(r=0.0, g=0.0, b=0.0, a=0.0),
-            lifetime=types.Duration(sec=0, nanosec=0),
-            frame_locked=False,
-            points=[],
-            colors=[],
-            texture_resource="",
-            texture=types.CompressedImage(header=frame.on_plane, format="", data=types.octets(b"")),
-            uv_coordinates=[],
-            text="",
-            mesh_resource="",
-            mesh_file=types.MeshFile(filename="", data=types.octets(b"")),
-            mesh_use_embedded_materials=False,
+            "lifetime": types.Duration(sec=0, nanosec=0),
+            "frame_locked": False,
+            "colors": [],
+            "texture_resource": "",
+            "texture": types.CompressedImage(header=frame.on_plane, format="", data=types.octets(b"")),
+            "uv_coordinates": [],
+            "text": "",
+            "mesh_resource": "",
+            "mesh_file": types.MeshFile(filename="", data=types.octets(b"")),
+            "mesh_use_embedded_materials": False,
+        }
+        self.markers = [self._marker("", 0, _DELETE_ALL, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), [])]
+
+    def _marker(
+        self,
+        name: str,
+        kind: int,
+        action: int,
+        color: tuple[float, float, float, float],
+        scale: tuple[float, float, float],
+        points: list[Any],
+    ) -> Any:
+        types, (red, green, blue, alpha), (x, y, z) = self._frame.types, color, scale
+        return types.Marker(
+            **self._common,
+            ns=name,
+            type=kind,
+            action=action,
+            scale=types.Vector3(x=x, y=y, z=z),
+            color=types.ColorRGBA(r=red, g=green, b=blue, a=alpha),
+            points=points,
         )
-        self.markers = [first]
 
     def add(
         self,
@@ -103,11 +120,5 @@ class _Drawing:
         points: Floats,
     ) -> None:
         """Add a marker of points (n, 2) or (n, 3) [m], if there are any."""
-        if not len(points):
-            return
-        types, (red, green, blue), (x, y, z) = self._frame.types, color, scale
-        marker = copy(self.markers[0])  # to make one anew takes several times as long
-        marker.ns, marker.type, marker.action = name, kind, _ADD
-        marker.scale, marker.color = types.Vector3(x=x, y=y, z=z), types.ColorRGBA(r=red, g=green, b=blue, a=1.0)
-        marker.points = self._frame.points(points)
-        self.markers.append(marker)
+        if len(points):
+            self.markers.append(self._marker(name, kind, _ADD, (*color, 1.0), scale, self._frame.points(points)))

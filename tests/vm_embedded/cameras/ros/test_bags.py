@@ -126,6 +126,7 @@ def test_images_after_the_end_of_tf_have_no_pose(tmp_path):
     assert "newest pose is" in found[-1][3]
 
 
+@pytest.mark.long
 def test_one_of_several_topics_must_be_chosen(tmp_path):
     left, right = Scene(count=2), Scene(count=3)
     messages = [
@@ -194,6 +195,7 @@ def whole(tmp_path_factory):
     return {each.suffix: each.read_bytes() for each in bags}
 
 
+@pytest.mark.long
 @settings(max_examples=150)
 @given(data=st.data())
 def test_damaged_bags_are_errors_of_one_line(whole, tmp_path_factory, data):
