@@ -45,7 +45,7 @@ def find_features(
     near = line_points(points)
     likely = near.part(np.flatnonzero(near.weights > LEAST))
     pieces, circle = _straight_and_round(near, likely)
-    pieces = pieces_on_ridges(pieces, points, profiles)
+    pieces, ridges = pieces_on_ridges(pieces, points, profiles)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
     feet = {name: np.array([each.position for each in things]).reshape(-1, 2) for name, things in found.items()}
     ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
@@ -68,6 +68,7 @@ def find_features(
         line_points=thinned,
         line_confidences=confidences,
         border=Border(border, border_pixels) if len(border) else None,
+        ridges=ridges,
     )
 
 
