@@ -3,8 +3,8 @@
 Renders recordings of cameras that walk over fields, turn and sway, then detects with soccer as on a robot, with the
 right poses and with a constant error of each kind. A recording has 33 pictures: the daemon looks at every third frame,
 so these are 100 frames. Some recordings show an empty carpet without lines, some people beside it. Poses have an error
-of 0.3 degrees in each picture, as those of joints do. Writes benchmarks/pose_check.json. Recordings that are there
-already are not rendered again.
+of 0.3 degrees in each picture, as those of joints do. Then `vm-calibrate pose` fits the error of a mount to each
+recording of a field. Writes benchmarks/pose_check.json. Recordings that are there already are not rendered again.
 """
 
 from __future__ import annotations
@@ -22,11 +22,14 @@ from typing import Any
 
 import numpy as np
 
+from vm_calibrate.field_pose import fit_field
 from vm_embedded import Detector
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.detection.pose_check import PoseCheck
+from vm_embedded.detection.pose_search import View
 from vm_embedded.detection.settings import Settings
+from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_synth.bodies.solids import JoinedBodies
@@ -58,6 +61,12 @@ ERRORS = {
     "height -10 %": (0.0, 0.0, 0.9),
 }
 """What is added to pitch and roll [deg], and the factor of the height."""
+
+MOUNT = (2.0, -1.5, 1.08)
+"""The error of a mount that is fitted: of pitch and roll [deg], and the factor of the height."""
+
+_FEWEST = 30
+"""Pieces of lines that a recording must show for a fit."""
 
 _ENTRIES = (
     "camera.height=[0.4, 1.2]",
@@ -133,36 +142,74 @@ def render_recording(maps: tuple[Path, ...], out: Path, number: int) -> None:
         write_picture(folder, index, environment.name, each, render(each, environment, tracer, configuration.ground))
 
 
-def verdicts(out: Path, number: int, error: str) -> list[str]:
-    """What the check says after each picture of a recording with this error."""
-    pitch, roll, factor = ERRORS[error]
-    random = np.random.default_rng([SEED, number, 1])
-    radius = json.loads((out / f"{number:03d}" / "scene0000000.json").read_text())["ball_radius"]
-    detector = Detector.from_file("soccer", Settings(object_radius=radius))
-    check, found = PoseCheck(), []
+def views_of(folder: Path, error: tuple[float, float, float]) -> list[View]:
+    """The pictures of a recording, with poses that have an error of pitch and roll [deg] and height [factor]."""
+    random = np.random.default_rng([SEED, int(folder.name), 1])
+    views = []
     for index in range(PICTURES):
-        folder = out / f"{number:03d}"
         camera = read_lens_file(folder / f"lens{index:07d}.yaml")
-        noise = NOISE * random.standard_normal(2)
         assert camera.orientation is not None
-        given = camera.orientation.adjusted(
-            math.radians(pitch) + float(noise[0]), math.radians(roll) + float(noise[1]), factor
-        )
-        seen = detector.detect(read_image(folder / f"image{index:07d}.jpg"), given, camera.lens)
-        pose = check.update(seen).pose
+        pitch, roll = np.radians(error[:2]) + NOISE * random.standard_normal(2)
+        given = camera.orientation.adjusted(float(pitch), float(roll), error[2])
+        views.append(View(read_image(folder / f"image{index:07d}.jpg"), camera.lens, given))
+    return views
+
+
+def radius_of(folder: Path) -> float:
+    """The radius of the balls of a recording [m]."""
+    return float(json.loads((folder / "scene0000000.json").read_text())["ball_radius"])
+
+
+def verdicts(folder: Path, error: str) -> list[str]:
+    """What the check says after each picture of a recording with this error."""
+    detector = Detector.from_file("soccer", Settings(object_radius=radius_of(folder)))
+    check, found = PoseCheck(), []
+    for each in views_of(folder, ERRORS[error]):
+        pose = check.update(detector.detect(each.image, each.orientation, each.lens)).pose
         assert pose is not None
         found.append(pose.verdict)
     return found
 
 
-def measure(out: Path, number: int) -> dict[str, list[str]]:
-    """The verdicts on a recording with each error."""
-    return {error: verdicts(out, number, error) for error in ERRORS}
+def fit(folder: Path) -> dict[str, float]:
+    """How far the fit of a mount is off: pitch and roll [deg], height [%], and the pieces of lines it rests on."""
+    found = fit_field(views_of(folder, MOUNT), True, "soccer", radius_of(folder), None)
+    pitch, roll, height = found.errors.tolist()
+    return {
+        "lines": found.tried.lines,
+        "balls": found.tried.balls,
+        "pitch": math.degrees(pitch) + MOUNT[0],
+        "roll": math.degrees(roll) + MOUNT[1],
+        "height": 100.0 * (math.exp(height) * MOUNT[2] - 1.0),
+    }
 
 
-def summary(found: dict[int, dict[str, list[str]]]) -> dict[str, Any]:
-    """In how many recordings of each kind an error was called doubtful or wrong, and the verdict at the end."""
-    table: dict[str, Any] = {}
+def measure(out: Path, number: int) -> dict[str, Any]:
+    """The verdicts on a recording with each error, and the fit of a mount if it shows a field."""
+    folder = out / f"{number:03d}"
+    found: dict[str, Any] = {error: verdicts(folder, error) for error in ERRORS}
+    if kind_of(number) == "field":
+        try:
+            found["fit"] = fit(folder)
+        except InputError as error:
+            found["fit"] = {"lines": 0, "fault": str(error)}
+    return found
+
+
+def summary(found: dict[int, dict[str, Any]]) -> dict[str, Any]:
+    """In how many recordings of each kind an error was called doubtful or wrong, and the verdict at the end; and the
+    median absolute errors of the fits."""
+    fits = [each["fit"] for each in found.values() if "fit" in each and each["fit"]["lines"] >= _FEWEST]
+    with_balls = [each for each in fits if each["balls"]]
+    table: dict[str, Any] = {
+        "fits": {
+            "recordings": len(fits),
+            "with balls": len(with_balls),
+            "pitch": float(np.median([abs(each["pitch"]) for each in fits])),
+            "roll": float(np.median([abs(each["roll"]) for each in fits])),
+            "height": float(np.median([abs(each["height"]) for each in with_balls])),
+        }
+    }
     for kind in _KINDS:
         numbers = [each for each in found if kind_of(each) == kind]
         table[kind] = {"recordings": len(numbers)}
@@ -190,7 +237,7 @@ def main() -> None:
             print(f"{done} of {len(numbers)} recordings rendered", flush=True)
         found = dict(enumerate(pool.map(partial(measure, options.out), numbers)))
     command = "python -m benchmarks.pose_check HDRI OUT"
-    result = {"command": command, "seed": SEED, "pictures": PICTURES, "summary": summary(found)}
+    result = {"command": command, "seed": SEED, "pictures": PICTURES, "summary": summary(found), "recordings": found}
     RESULTS.write_text(json.dumps(result, indent=1) + "\n")
     print(json.dumps(result["summary"], indent=1))
 
