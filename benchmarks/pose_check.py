@@ -133,10 +133,10 @@ def render_recording(maps: tuple[Path, ...], out: Path, number: int) -> None:
     configuration = read_sections(SceneConfiguration, SCENES, parse_overrides([*_ENTRIES, *_KINDS[kind]], ""))
     scene, environment = scene_of(Job(folder, maps, SEED, configuration), number)
     if kind == "empty":
-        assert scene.field is not None  # nothing but carpet as far as the camera sees
-        scene = replace(
-            scene, field=replace(scene.field, length=100.0, width=80.0, border=math.inf, middle=(0.0, 20.0))
-        )
+        assert scene.field is not None  # no line is nearer than 40 m
+        large = replace(scene.field, length=300.0, width=240.0, border=math.inf)
+        x, y = (large.rotation @ (-40.0, -60.0)).tolist()
+        scene = replace(scene, field=replace(large, middle=(x, y)))
     tracer = Tracer()
     for index, each in enumerate(steps_of(scene, number)):
         write_picture(folder, index, environment.name, each, render(each, environment, tracer, configuration.ground))
