@@ -65,8 +65,8 @@ ERRORS = {
 MOUNT = (2.0, -1.5, 1.08)
 """The error of a mount that is fitted: of pitch and roll [deg], and the factor of the height."""
 
-_FEWEST = 30
-"""Pieces of lines that a recording must show for a fit."""
+_FEWEST, _FEWEST_BALLS = 30, 3
+"""Pieces of lines that a recording must show for a fit, and balls for a height."""
 
 _ENTRIES = (
     "camera.height=[0.4, 1.2]",
@@ -200,7 +200,7 @@ def summary(found: dict[int, dict[str, Any]]) -> dict[str, Any]:
     """In how many recordings of each kind an error was called doubtful or wrong, and the verdict at the end; and the
     median absolute errors of the fits."""
     fits = [each["fit"] for each in found.values() if "fit" in each and each["fit"]["lines"] >= _FEWEST]
-    with_balls = [each for each in fits if each["balls"]]
+    with_balls = [each for each in fits if each["balls"] >= _FEWEST_BALLS]
     table: dict[str, Any] = {
         "fits": {
             "recordings": len(fits),
@@ -237,9 +237,10 @@ def main() -> None:
             print(f"{done} of {len(numbers)} recordings rendered", flush=True)
         found = dict(enumerate(pool.map(partial(measure, options.out), numbers)))
     command = "python -m benchmarks.pose_check HDRI OUT"
-    result = {"command": command, "seed": SEED, "pictures": PICTURES, "summary": summary(found), "recordings": found}
+    result = {"command": command, "seed": SEED, "pictures": PICTURES, **summary(found)}
+    result["fitted"] = [each["fit"] for each in found.values() if "fit" in each]
     RESULTS.write_text(json.dumps(result, indent=1) + "\n")
-    print(json.dumps(result["summary"], indent=1))
+    print(json.dumps(summary(found), indent=1))
 
 
 if __name__ == "__main__":
