@@ -155,10 +155,10 @@ class Node:
         if sent is not None:
             sent.result()  # no more than a frame waits for slow readers, and no error is lost
         self._sent = self._sender.submit(self._send, frame)
-        if shot.captured - self._drawn >= _DRAWING_PERIOD and (self._drawing is None or self._drawing.done()):
-            if self._debug_image.readers or self._map.readers:
-                self._drawn = shot.captured
-                self._drawing = asyncio.ensure_future(asyncio.to_thread(self._publish_drawings, frame, shot.image))
+        is_due = shot.captured - self._drawn >= _DRAWING_PERIOD and (self._drawing is None or self._drawing.done())
+        if is_due and (self._debug_image.readers or self._map.readers):
+            self._drawn = shot.captured
+            self._drawing = asyncio.ensure_future(asyncio.to_thread(self._publish_drawings, frame, shot.image))
 
     def _send(self, frame: FrameResults) -> None:
         """Publish the arrays of a frame: half a millisecond for each topic that is read, so not in the event loop."""
