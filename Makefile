@@ -7,13 +7,10 @@ OUT ?= data/train
 COUNT ?= 8000
 SEED ?= 1
 SCENES ?= export/vm_synth/polyhaven.toml
-NETWORKS := ball ball-small soccer
+NETWORKS := ball soccer
 BUILD ?= build/networks
-PICTURES ?= data/soccer
-FURTHER ?= data/further
-THIRD ?= data/third
+PICTURES ?= data/varied
 CALIBRATION ?= data/calibration
-UPRIGHTS := goal robot
 CALIBRATE := $(BIN)/vm-evaluate calibrate --radius-of scene
 CANARY := --canary vm_embedded/models/canary.jpg export/networks/canary.yaml
 TEST ?= data/test
@@ -88,9 +85,7 @@ data: need-HDRI .venv/synth ## render a training set: make data HDRI=folder-of-m
 	$(BIN)/vm-synth $(OUT) --count $(COUNT) --hdri $(HDRI) --seed $(SEED) --config $(SCENES)
 
 networks: need-HDRI .venv/dev ## train the networks of the package from their seeds: make networks HDRI=folder-of-maps (hours)
-	$(MAKE) data OUT=data/soccer COUNT=16000 SEED=1 SCENES=export/vm_synth/soccer.toml
-	$(MAKE) data OUT=$(FURTHER) COUNT=3650 SEED=3 SCENES=export/vm_synth/soccer.toml
-	$(MAKE) data OUT=$(THIRD) COUNT=4423 SEED=5 SCENES=export/vm_synth/soccer.toml
+	$(MAKE) data OUT=$(PICTURES) COUNT=16000 SEED=1 SCENES=export/vm_synth/varied.toml
 	$(BIN)/python -m benchmarks.calibration_data $(HDRI) $(CALIBRATION)
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
@@ -99,50 +94,23 @@ networks: need-HDRI .venv/dev ## train the networks of the package from their se
 # Train in the folder of the target, with the first prerequisite as configuration, or go on with that training.
 train = if test -e $(@D)/run.json; then $(BIN)/vm-train resume $(@D); else $(BIN)/vm-train $(1) -o $(@D) --config $<; fi
 
-$(BUILD)/mesh/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
+.PRECIOUS: $(BUILD)/%/model.pt $(BUILD)/%-look/look.pt
+$(BUILD)/ball/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
 	$(call train,$(PICTURES) --unpacked $(BUILD)/unpacked)
 
-$(BUILD)/glance/look.pt: export/networks/glance.toml $(BUILD)/mesh/model.pt
-	$(call train,look $(PICTURES) --from $(BUILD)/mesh/model.pt)
+$(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/soccer/model.pt
+	$(call train,look $(PICTURES) --from $(BUILD)/soccer/model.pt)
 
-.PRECIOUS: $(BUILD)/%-look/look.pt
-$(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/glance/look.pt
-	$(call train,look $(PICTURES) --from $(BUILD)/mesh/model.pt --glance $(BUILD)/glance/look.pt)
+$(BUILD)/ball.onnx: $(BUILD)/ball/model.pt $(BUILD)/ball-look/look.pt
+	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt $(CANARY) -o $@
 
-$(BUILD)/ball.onnx: $(BUILD)/ball-look/look.pt
-	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs -o $@
-
-$(BUILD)/%-calibrated.onnx: $(BUILD)/%-look/look.pt
-	$(BIN)/vm-export $(BUILD)/mesh/model.pt --look $< --layout runs $(CANARY) -o $(BUILD)/$*-uncalibrated.onnx
-	$(CALIBRATE) $(BUILD)/$*-uncalibrated.onnx $(CALIBRATION)/* -o $@
-
-vm_embedded/models/ball-small.onnx: $(BUILD)/ball-small-calibrated.onnx
-	cp $< $@
-
-$(BUILD)/wide-look/look.pt: export/networks/wide-look.toml $(BUILD)/ball-calibrated.onnx
-	$(call train,look $(THIRD) --from $(BUILD)/ball-calibrated.onnx --glance $(BUILD)/ball-calibrated.onnx)
-
-vm_embedded/models/ball.onnx: $(BUILD)/ball-calibrated.onnx $(BUILD)/wide-look/look.pt
-	$(BIN)/vm-export $< --look $(BUILD)/wide-look/look.pt -o $(BUILD)/ball-wide.onnx
-	$(CALIBRATE) $(BUILD)/ball-wide.onnx $(CALIBRATION)/* -o $@
-
-$(UPRIGHTS:%=$(BUILD)/%-glance/look.pt): $(BUILD)/%-glance/look.pt: export/networks/upright-glance.toml $(BUILD)/soccer/model.pt
-	$(call train,look $(PICTURES) --from $(BUILD)/soccer/model.pt --set patches.object_class=$*)
-
-$(UPRIGHTS:%=$(BUILD)/%-look/look.pt): $(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/%-glance/look.pt
-	$(call train,look $(PICTURES) --from $(BUILD)/soccer/model.pt --glance $(BUILD)/$*-glance/look.pt)
-
-$(BUILD)/robot-further/look.pt: export/networks/robot-further.toml $(BUILD)/robot-look/look.pt
-	$(call train,look $(FURTHER) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-look/look.pt)
-
-$(BUILD)/robot-third/look.pt: export/networks/robot-further.toml $(BUILD)/robot-further/look.pt
-	$(call train,look $(THIRD) --from $(BUILD)/soccer/model.pt --start $(BUILD)/robot-further/look.pt --set data.validation=0.05)
-
-vm_embedded/models/soccer.onnx: $(BUILD)/soccer/model.pt $(BUILD)/wide-look/look.pt $(BUILD)/goal-look/look.pt $(BUILD)/robot-third/look.pt
-	$(BIN)/vm-export $< --look $(BUILD)/wide-look/look.pt --look-above 0.005 --layout runs $(CANARY) -o $(BUILD)/balls.onnx
+$(BUILD)/soccer.onnx: $(BUILD)/soccer/model.pt $(BUILD)/ball-look/look.pt $(BUILD)/goal-look/look.pt $(BUILD)/robot-look/look.pt
+	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt $(CANARY) -o $(BUILD)/balls.onnx
 	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
-	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-third/look.pt -o $(BUILD)/soccer-uncalibrated.onnx
-	$(CALIBRATE) $(BUILD)/soccer-uncalibrated.onnx $(CALIBRATION)/* -o $@
+	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $@
+
+vm_embedded/models/%.onnx: $(BUILD)/%.onnx
+	$(CALIBRATE) $< $(CALIBRATION)/* -o $@
 
 test-data: need-HDRI .venv/synth ## render the test sets: make test-data HDRI=folder-of-maps (an hour)
 	$(BIN)/python -m benchmarks.test_data $(HDRI) $(TEST)
@@ -159,11 +127,11 @@ bench-train: need-DATA .venv/dev ## measure vm-train: make bench-train DATA=fold
 	$(BIN)/python -m benchmarks.training $(DATA)
 
 choices: .venv/dev ## measure what each choice of a training is worth: make choices [TEST=data/test], after networks and test-data (hours)
-	$(BIN)/python -m benchmarks.choices data/soccer $(TEST)/field build/choices
+	$(BIN)/python -m benchmarks.choices $(PICTURES) $(TEST)/field build/choices
 	$(BIN)/python -m benchmarks.choices_report
 
 look-choices: .venv/dev ## measure what each choice of a close look is worth: make look-choices [TEST=data/test], after networks and test-data (hours)
-	$(BIN)/python -m benchmarks.look_choices data/soccer $(TEST)/field build/look-choices
+	$(BIN)/python -m benchmarks.look_choices $(PICTURES) $(TEST)/field build/look-choices
 	$(BIN)/python -m benchmarks.look_choices_report
 
 peers: need-HDRI .venv/bench ## train other detectors, and compare their speed and accuracy: make peers HDRI=folder-of-maps [TEST=data/test] (hours)

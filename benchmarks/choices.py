@@ -58,7 +58,7 @@ SHIPPED: Changes = {
     "mesh": {"intersections": 3},
     "training": {"optimizer": "muon", "rate": 0.007, "mirrored": 0.5, "views": 2},
 }
-"""What the mesh network of `ball` has instead of the base: export/networks/mesh.toml."""
+"""What a mesh network of `ball` on rings had instead of the base."""
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@
 
 It fine-tunes a network on 25, 50, 100 and all frames, drawn with each of three seeds, and writes the recall of the test
 frames' boxes before and after: at the threshold that lets 1 in 2000 other places pass. `work` keeps the trainings, so
-that the program can be interrupted and started again. Results: benchmarks/fine_tuning.json and
-benchmarks/experiments/fine-tuning.svg.
+that the program can be interrupted and started again. Results: benchmarks/fine_tuning.json,
+benchmarks/experiments/fine-tuning.svg, and a sentence of docs/own-frames.md.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import json
 import random
 import subprocess
 import sys
+import textwrap
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.report import DOCS, EXPERIMENTS, fill
 from benchmarks.window_scores import score_frames
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.network.bundled import DEFAULT, model_path
@@ -34,6 +36,8 @@ from vm_train.tuning.boxed_objects import all_objects
 from vm_train.tuning.candidates import search_radii
 from vm_workstation.plots import new_figure, save_figure
 
+RESULTS = Path(__file__).with_name("fine_tuning.json")
+OWN_FRAMES = DOCS / "own-frames.md"
 COUNTS = (25, 50, 100, 0)
 """Frames to learn from; 0: all."""
 
@@ -42,8 +46,7 @@ SEEDS = (0, 1, 2)
 
 def measure(model: Path, frames: Sequence[BoxedPicture], name: str) -> dict[str, Any]:
     """The scores of a model file's close look on frames with boxes of a round object."""
-    look = CloseLook.of(read_model(model))
-    assert look is not None
+    look = CloseLook.of(read_model(model))[name]
     radii = search_radii(all_objects(frames, name, True))
     bar = ProgressBar(len(frames), "looked at")
     score = score_frames(look, frames, name, True, radii, bar.advance)
@@ -85,6 +88,18 @@ def fine_tune(model: str, frames: Sequence[BoxedPicture], seed: int, folder: Pat
     return made
 
 
+def sentence(result: dict[str, Any]) -> str:
+    """What docs/own-frames.md says about the gain of fifty frames."""
+    before, some = result["before"], [each for each in result["after"] if each["frames"] == 50]
+    found, false = ([each[part] for each in some] for part in ("reported_boxes", "reported_others"))
+    text = (
+        f"On {result['test_frames']} frames from halls where `{result['network']}` found {before['reported_boxes']} of "
+        f"{before['boxes']} balls, with {before['reported_others']} false ones, it finds {min(found)} to {max(found)} "
+        f"after fine-tuning with fifty frames of other days, with {min(false)} to {max(false)} false ones."
+    )
+    return textwrap.fill(text, 120)
+
+
 def plot(result: dict[str, Any], path: Path) -> None:
     """The recall over the number of frames, each seed as a dot."""
     figure = new_figure(6.0, 3.6)
@@ -114,15 +129,15 @@ def main() -> None:
     parser.add_argument("--counts", type=int, nargs="+", default=list(COUNTS), help="frames to learn from; 0: all")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS), help="seeds of drawing and training")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the trainings")
-    parser.add_argument("--json", type=Path, default=Path("benchmarks/fine_tuning.json"), help="results")
-    parser.add_argument("--plot", type=Path, default=Path("benchmarks/experiments/fine-tuning.svg"), help="their plot")
+    parser.add_argument("--json", type=Path, default=RESULTS, help="results")
     options = parser.parse_args()
     names = parse_names(options.names)
     training, test = (read_boxes(folder, names=names).pictures for folder in (options.training, options.test))
     before = read_model(model_path(options.model))
-    assert before.manifest.look is not None
-    name = before.manifest.look.object_class
-    result: dict[str, Any] = {"network": options.model, "before": measure(before.path, test, name), "after": []}
+    name = before.manifest.searched_class
+    assert name is not None
+    result: dict[str, Any] = {"network": options.model, "test_frames": len(test)}
+    result |= {"before": measure(before.path, test, name), "after": []}
     print(f"before: {result['before']}", flush=True)
     for count in options.counts:
         for seed in options.seeds:
@@ -135,7 +150,8 @@ def main() -> None:
             result["after"].append(row | measure(made, test, name))
             print(result["after"][-1], flush=True)
             options.json.write_text(json.dumps(result, indent=1) + "\n")
-    plot(result, options.plot)
+    plot(result, EXPERIMENTS / "fine-tuning.svg")
+    fill(OWN_FRAMES, {"fine-tuning": sentence(result)})
 
 
 if __name__ == "__main__":

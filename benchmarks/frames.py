@@ -37,20 +37,28 @@ def frames() -> tuple[str, list[Frame]]:
 
     Those of the paper's tab:visualmesh_performance have 1280 x 1024 px, as the reference images do.
     """
-    shared = Path(os.environ.get("VM_SHARED", _TOP.parent / "shared")) / "reference" / "images"
-    if "VM_SHARED" in os.environ and not shared.is_dir():
-        raise SystemExit(f"VM_SHARED: there is no folder {shared}")
-    if shared.is_dir():
-        return "the 15 reference images", _read(shared)
+    folder = frame_folder("reference/images")
+    if folder is not None:
+        return "the 15 reference images", read_frames(folder)
     return "the demo's frames, since the reference images are not there", demo_frames()
+
+
+def frame_folder(name: str) -> Path | None:
+    """A folder in ../shared; None if there is no ../shared. Raises SystemExit if VM_SHARED names another place that
+    lacks it."""
+    folder = Path(os.environ.get("VM_SHARED", _TOP.parent / "shared")) / name
+    if "VM_SHARED" in os.environ and not folder.is_dir():
+        raise SystemExit(f"VM_SHARED: there is no folder {folder}")
+    return folder if folder.is_dir() else None
 
 
 def demo_frames() -> list[Frame]:
     """The frames of the demo."""
-    return _read(_TOP / "tests" / "fixtures" / "demo")
+    return read_frames(_TOP / "tests" / "fixtures" / "demo")
 
 
-def _read(folder: Path) -> list[Frame]:
+def read_frames(folder: Path) -> list[Frame]:
+    """The frames of a folder."""
     found = []
     for path in sorted(folder.glob("image*.jpg")):
         lens_path = path.with_name(f"lens{path.stem[5:]}.yaml")

@@ -63,11 +63,8 @@ VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
     "2000 pictures": {"pictures": {"training": 2000}},
     "4000 pictures": {"pictures": {"training": 4000}},
     "7500 pictures": {"pictures": {"training": 7500}},
-    "points above 0.1": {"patches": {"above": 0.1}},
-    "20 proposals": {"patches": {"proposals": 20}},
-    "proposals of ball-small": {"mesh": {"network": "ball-small"}},
-    "one pass": {"patches": {"passes": 1}},
-    "three passes": {"patches": {"passes": 3}},
+    "20 proposals": {"patches": {"max_proposals": 20}},
+    "proposals of soccer": {"mesh": {"network": "soccer"}},
     "one round": {"training": {"rounds": 1}},
     "nothing moved or hidden": {"augmentation": {"rotation": 0.0, "zoom": 0.0, "shift": 0.0, "hidden": 0.0}},
 }
@@ -134,8 +131,7 @@ def _share_patches(run: LookRun, out: Path) -> None:
 
 def _cut(run: LookRun) -> LookConfiguration:
     """What decides about the patches of a run."""
-    patches = replace(run.configuration.patches, passes=1)
-    return replace(LookConfiguration(), classes=run.configuration.classes, patches=patches)
+    return replace(LookConfiguration(), classes=run.configuration.classes, patches=run.configuration.patches)
 
 
 def scored(model: Path, test: Path) -> dict[str, Any]:

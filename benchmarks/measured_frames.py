@@ -2,6 +2,8 @@
 
     python -m benchmarks.measured_frames ../shared/real --object-radius 0.11 --sheet real.jpg
 
+With `--json benchmarks/measured_frames.json`, shipped_report.py writes the README's sentence from the result.
+
 A folder holds `images/imageX.jpg` with `images/lensX.yaml`, and `balls.json`: for each frame its ball, or a list of its
 balls, with center `cx`, `cy` and radius `r_px` [px], and distance `dist` from the camera [m]. A detection is right if
 its center lies on a ball that no detection before it took.
@@ -12,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import textwrap
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,6 +32,7 @@ from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_workstation.contact_sheet import write_sheet
 
+RESULTS = Path(__file__).with_name("measured_frames.json")
 CELL = 240  # [px]
 
 
@@ -36,6 +40,7 @@ CELL = 240  # [px]
 class Score:
     """Result on some frames: balls found with their relative errors of distance, missed balls, and false ones."""
 
+    frames: int = 0
     found: list[tuple[str, dict[str, float], Detection]] = field(default_factory=list)
     missed: list[tuple[str, dict[str, float]]] = field(default_factory=list)
     false: list[tuple[str, Detection]] = field(default_factory=list)
@@ -46,6 +51,8 @@ class Score:
         close_missed = sum(ball["dist"] < near for _, ball in self.missed)
         errors = [abs(detection.distance / ball["dist"] - 1.0) for _, ball, detection in self.found]
         return {
+            "frames": self.frames,
+            "near": near,
             "balls": len(self.found) + len(self.missed),
             "found": len(self.found),
             "balls_near": close + close_missed,
@@ -63,6 +70,7 @@ def score(folder: Path, detector: Detector) -> Score:
         lens = read_lens_file(path.with_name(path.name.replace("image", "lens")).with_suffix(".yaml"))
         assert lens.orientation is not None
         found = detector.detect(read_image(path), lens.orientation, lens.lens)
+        result.frames += 1
         balls = truth.get(path.name, [])
         left = [balls] if isinstance(balls, dict) else list(balls)
         for detection in found.objects:
@@ -75,6 +83,17 @@ def score(folder: Path, detector: Detector) -> Score:
                 result.found.append((path.name, hit, detection))
         result.missed += [(path.name, each) for each in left]
     return result
+
+
+def sentence(result: dict[str, Any]) -> str:
+    """The README's sentence about the frames of ../shared/real, from a summary."""
+    false = {0: "no false ball", 1: "one false ball"}.get(result["false"], f"{result['false']} false balls")
+    text = (
+        f"On {result['frames']} frames of real robots in four halls, `{DEFAULT}` finds {result['found']} of "
+        f"{result['balls']} balls, {result['found_near']} of the {result['balls_near']} nearer than "
+        f"{result['near']:g} m, and reports {false}."
+    )
+    return textwrap.fill(text, 120)
 
 
 def sheet(folder: Path, result: Score) -> Image:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import torch
 
@@ -52,9 +54,9 @@ def checkpoint(shape: NetworkShape, intersections: float, max_distance: float) -
     return Checkpoint(network, manifest)
 
 
-def model_file(made: Checkpoint, layout: str, path) -> ModelFile:
+def model_file(made: Checkpoint, path: Path) -> ModelFile:
     """The checkpoint as vm-export writes it."""
-    export(made, path, layout)
+    export(made, path)
     return read_model(path)
 
 

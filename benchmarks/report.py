@@ -76,12 +76,9 @@ def sessions(found: dict[str, Any]) -> str:
         row = part["median_frame"]
         operations = found["operations_per_point"][name]
         floor = 1e3 * operations * row["points"] / (1e9 * found["sgemm_gflops"])
-        values = [ms(row[kind]["p50"]) for kind in ("plain", "numpy", "runs")]
-        spread = part["plain_over_runs_all"]
-        over = [f"{part['plain_over_runs']:.1f}", f"{min(spread):.1f} to {max(spread):.1f}", f"{floor:.3f}"]
-        rows.append([name, str(row["points"]), *values, *over])
-    heads = ["network", "points", "plain", "numpy", "runs", "plain / runs", "over all frames", "floor"]
-    return table(heads, rows)
+        values = [ms(row[kind]["p50"]) for kind in ("session", "numpy")]
+        rows.append([name, str(row["points"]), *values, f"{floor:.3f}"])
+    return table(["network", "points", "session", "numpy", "floor"], rows)
 
 
 def whole_calls(found: dict[str, Any]) -> str:
@@ -120,13 +117,15 @@ def stages(found: dict[str, Any]) -> str:
 
 
 def speed(found: dict[str, Any]) -> str:
-    """The README's table: whole calls of the networks of the package, with the mesh that they come with."""
+    """The README's part: whole calls of the networks of the package, with the mesh that they come with."""
+    whole = {name: row for name, row in found["shipped"].items() if name.endswith("to 14 m")}
+    assert {row["found"] for row in whole.values()} == {1}
+    about = f"Time for a picture of 640 x 512 px with one ball, on one core of an {found['machine']['processor']}:"
     rows = [
         [name.split(",")[0], str(row["points"]), *(f"{row['total'][share]:.1f} ms" for share in ("p50", "p99"))]
-        for name, row in found["shipped"].items()
-        if name.endswith("to 14 m")
+        for name, row in whole.items()
     ]
-    return table(["network", "points", "whole call, median", "p99"], rows)
+    return f"{about}\n\n{table(['network', 'points', 'whole call, median', 'p99'], rows)}"
 
 
 def peers(found: dict[str, Any], other: dict[str, Any]) -> str:
@@ -226,7 +225,7 @@ def plot_peers(found: dict[str, Any], path: Path) -> None:
 
 
 _LEFT_OF_POINT = (
-    *("Visual Mesh 5", "ball-small", "SSD MobileNet v1, 300"),
+    *("Visual Mesh 5", "ball", "SSD MobileNet v1, 300"),
     *("YOLO v1, 448", "YOLO v3, 416", "YOLO nano, 640"),
 )
 """Names that would cover another one on the right of their points."""

@@ -42,25 +42,24 @@ SOAK_FRAMES = 200_000
 
 
 class Models:
-    """The networks of NETWORKS in both layouts, as files in a folder."""
+    """The networks of NETWORKS, as files in a folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.networks: dict[str, Network] = {}
-        self._files: dict[tuple[str, str], ModelFile] = {}
+        self._files: dict[str, ModelFile] = {}
         for name, (shape, intersections, max_distance) in NETWORKS.items():
             made = checkpoint(shape, intersections, max_distance)
             self.networks[name] = made.network
-            for layout in ("plain", "runs"):
-                self._files[name, layout] = model_file(made, layout, folder / f"{name}.{layout}.onnx")
+            self._files[name] = model_file(made, folder / f"{name}.onnx")
 
-    def detector(self, name: str, layout: str = "runs", **settings: Any) -> Detector:
-        return Detector(self._files[name, layout], Settings(**settings))
+    def detector(self, name: str, **settings: Any) -> Detector:
+        return Detector(self._files[name], Settings(**settings))
 
     def other(self, name: str, intersections: float, max_distance: float, **settings: Any) -> Detector:
         """The same network on another mesh."""
         made = checkpoint(NETWORKS[name][0], intersections, max_distance)
-        return Detector(model_file(made, "runs", self.folder / "other.onnx"), Settings(**settings))
+        return Detector(model_file(made, self.folder / "other.onnx"), Settings(**settings))
 
 
 def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
@@ -76,8 +75,8 @@ def mesh_on_screen(detector: Detector, frame: Frame) -> Mesh:
 def session_call(detector: Detector, mesh: Mesh) -> Callable[[], object]:
     """A call of the network alone on a mesh, with prepared inputs."""
     layout = choose_layout(mesh, detector.manifest)
-    colors = np.random.default_rng(0).random((3, len(layout.slots)), dtype=np.float32)
-    feeds = layout.feeds(colors, layout.slots < len(mesh))
+    colors = np.random.default_rng(0).random((3, len(mesh)), dtype=np.float32)
+    feeds = layout.feeds(colors, np.ones(len(mesh), dtype=bool))
     model = detector.session.onnx
     return lambda: model.run(feeds)
 
@@ -91,30 +90,20 @@ def numpy_call(network: Network, mesh: Mesh) -> Callable[[], object]:
 
 
 def sessions(models: Models, work: list[Frame], rounds: int) -> dict[str, Any]:
-    """Plain graph, fast graph and numpy loop, session only, for each network over the frames."""
+    """Graph and numpy loop, session only, for each network over the frames."""
     found: dict[str, Any] = {}
     for name in NETWORKS:
-        plain, fast = models.detector(name, "plain"), models.detector(name, "runs")
+        detector = models.detector(name)
         rows = []
         for frame in work:
-            mesh = mesh_on_screen(fast, frame)
+            mesh = mesh_on_screen(detector, frame)
             times = interleaved(
-                {
-                    "plain": session_call(plain, mesh),
-                    "runs": session_call(fast, mesh),
-                    "numpy": numpy_call(models.networks[name], mesh),
-                },
+                {"session": session_call(detector, mesh), "numpy": numpy_call(models.networks[name], mesh)},
                 rounds if len(mesh) < 10_000 else max(rounds // 5, 5),
             )
             rows.append({"frame": frame.name, "points": len(mesh), **times})
         rows.sort(key=lambda row: row["points"])
-        median = rows[len(rows) // 2]
-        found[name] = {
-            "median_frame": median,
-            "plain_over_runs": round(median["plain"]["p50"] / median["runs"]["p50"], 2),
-            "plain_over_runs_all": [round(row["plain"]["p50"] / row["runs"]["p50"], 2) for row in rows],
-            "frames": rows,
-        }
+        found[name] = {"median_frame": rows[len(rows) // 2], "frames": rows}
     return found
 
 
@@ -139,7 +128,7 @@ def whole_calls(models: Models, work: list[Frame], rounds: int) -> dict[str, Any
         }
         times = interleaved(calls, rounds)  # type: ignore[arg-type]
         row: dict[str, Any] = dict(times)
-        row |= {"frame": frame.name, "points": len(seen.pixels), "slots": len(seen.observation.layout)}
+        row |= {"frame": frame.name, "points": len(seen.pixels)}
         row["whole_over_session"] = round(row["whole"]["p50"] / row["session"]["p50"], 2)
         row["p99_over_p50"] = round(row["whole"]["p99"] / row["whole"]["p50"], 2)
         found[name] = row
@@ -233,7 +222,7 @@ def walks(models: Models, work: list[Frame], seconds: float) -> dict[str, Any]:
         lens = frame.lens.for_image(frame.size)
         rows = []
         for height in (0.5, 0.8, 1.1):
-            cache, largest = MeshCache(detector.manifest, detector.settings, detector.session.arrange), 0.0
+            cache, largest = MeshCache(detector.manifest, detector.settings), 0.0
             middle = Orientation.from_roll_pitch(height, 0.0, 0.35)
             for number, orientation in enumerate(walk(middle, int(30 * seconds))):
                 if number == 30:

@@ -1,6 +1,8 @@
 """The default settings of detection, chosen on the validation pictures of a training: `python -m benchmarks.threshold`.
 
-    python -m benchmarks.threshold build/networks/mesh data/soccer
+    python -m benchmarks.threshold RUN DATA
+
+RUN is the folder of a training on rings, whose network has no peaks.
 
 Answers are computed once; each combination of settings then judges them. Prints recall, precision, F1 and false balls
 per picture, best F1 first, and the default settings last.
@@ -16,6 +18,7 @@ from itertools import product
 from pathlib import Path
 
 from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
+from vm_embedded.detection.looking import judge_classes
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.settings import Settings
@@ -36,7 +39,7 @@ def observed(
     subject: ExactSubject, data: Path, numbers: Path, part: str
 ) -> Iterator[tuple[list[TrueObject], Observation]]:
     """True balls and classified points of each picture in one part of a training."""
-    table = tomllib.loads((NETWORKS / "mesh.toml").read_text())["classes"]
+    table = tomllib.loads((NETWORKS / "ball.toml").read_text())["classes"]
     classes = ClassTable.from_table(table).mask_classes()
     for files in select_pictures([data], numbers, part):
         picture = read_picture(files, classes)
@@ -54,7 +57,8 @@ def scored(pictures: list[tuple[list[TrueObject], Observation]], settings: Setti
     """Scores of all pictures with some settings."""
     scores = ObjectScores(min_radius=2.0)
     for truths, observation in pictures:
-        found, _ = locate(observation, None, settings, Stopwatch())
+        watch = Stopwatch()
+        found, _ = locate(observation, judge_classes(observation, {}, settings, watch, uprights=False), settings, watch)
         scores.add(truths, found)
     return scores
 

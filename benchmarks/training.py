@@ -1,7 +1,7 @@
 """Speed of vm-train and of its parts: `make bench-train DATA=...`.
 
 It times each part alone on one pinned core, then whole trainings with one reading and one learning process.
-Writes benchmarks/training.json and the table of docs/training.md.
+Writes benchmarks/training.json and the table of experiments/training.md.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 import torch
 
-from benchmarks.report import DOCS, fill
+from benchmarks.report import EXPERIMENTS, fill
 from vm_embedded.cli.machine import describe_machine
 from vm_embedded.config.sections import read_sections
 from vm_export.network import Network
@@ -34,7 +34,7 @@ from vm_train.runs.hardware import Hardware
 from vm_train.runs.loop import train
 
 RESULTS = Path(__file__).with_name("training.json")
-PAGE = DOCS / "training.md"
+PAGE = EXPERIMENTS / "training.md"
 NETWORKS = {"5 x 4": (5, 4), "9 x 8": (9, 8)}
 BATCH = 8
 

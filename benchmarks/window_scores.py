@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import read_image
-from vm_embedded.detection.looking import Look, look_at
+from vm_embedded.detection.looking import Look
 from vm_embedded.detection.pyramid import Pyramid
 from vm_train.boxes.box import BoxedPicture
 from vm_train.look.collection import random_of
 from vm_train.tuning.boxed_objects import objects_of
 from vm_train.tuning.candidates import find_candidates
-from vm_train.tuning.windows import WindowPlaces, Windows, random_windows
+from vm_train.tuning.windows import Windows, random_windows
 
 REPORTED = 0.5
 """Probability from which a detector reports an object, unless its settings say another one."""
@@ -119,9 +119,9 @@ def score_frames(
 
 
 def _looked(pyramid: Pyramid, look: Look, windows: Windows, number: int) -> Looked:
-    places = WindowPlaces(pyramid, windows)
-    answers = look_at(places, look)
-    return Looked(places.windows, np.full(len(windows), number, dtype=np.intp), answers[:, 0].astype(np.float64))
+    answers = look.run(windows.cut(pyramid, look.contract)).astype(np.float64)
+    seen = windows.moved(answers[:, 1], answers[:, 2])
+    return Looked(seen, np.full(len(windows), number, dtype=np.intp), answers[:, 0])
 
 
 def _share(right: npt.NDArray[np.bool_]) -> float:

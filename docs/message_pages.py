@@ -143,9 +143,9 @@ def features_table() -> str:
         if each.is_record:
             kinds.setdefault(each.type, []).append(f"`{each.name}`")
     rows = [
-        f"| {', '.join(names)} | `{each.name}` | {_cell(record, each)} |"
+        f"| {'' if number else ', '.join(names)} | `{each.name}` | {_cell(record, each)} |"
         for record, names in kinds.items()
-        for each in entries(record)
+        for number, each in enumerate(entries(record))
     ]
     return "\n".join(["| of | field | meaning |", "| --- | --- | --- |", *rows]) + "\n"
 

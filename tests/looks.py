@@ -9,8 +9,8 @@ import numpy as np
 
 from tests.manifests import ball_manifest
 from vm_embedded.arrays import Image, Singles
-from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY, LookContract
-from vm_embedded.network.look_test import ANSWERS
+from vm_embedded.network.look_contract import LookContract, look_key
+from vm_embedded.network.look_example import ANSWERS
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
 MIXTURE = np.array([[0.001, 0.002, 0.003, 0.0], [0.0, 0.001, -0.002, 0.004], [0.002, 0.0, 0.0, 0.001]])
@@ -19,7 +19,7 @@ MIXTURE = np.array([[0.001, 0.002, 0.003, 0.0], [0.0, 0.001, -0.002, 0.004], [0.
 
 def look_contract(**changes: Any) -> LookContract:
     """A contract for balls in patches of 8 x 8 samples, or with other entries."""
-    entries = {"object_class": "ball", "size": 8, "extent": 1.75, "above": 0.05, "passes": 1}
+    entries = {"object_class": "ball", "size": 8, "extent": 1.75, "max_proposals": 10}
     return LookContract(**(entries | changes))
 
 
@@ -44,18 +44,17 @@ def small_look(size: int = 8, width: int = len(ANSWERS)) -> bytes:
     return graph.model({"patches": (UINT8, ["n", size, size, 3])}, {"answers": (FLOAT, ["n", width])}, {}, "a test")
 
 
-def model_with(look: bytes | str | None, manifest: Manifest, glance: bytes | str | None = None) -> bytes:
-    """A model file whose mesh network nobody runs, with these bytes or texts as its look network and its glance."""
+def model_with(look: bytes | str | None, manifest: Manifest) -> bytes:
+    """A model file whose mesh network nobody runs, with these bytes or this text as its look network at balls."""
     from vm_export.onnx_graph import FLOAT, OnnxGraph
 
     graph, metadata = OnnxGraph(), {METADATA_KEY: manifest.as_json()}
     graph.node("Identity", ["points"], "probabilities")
-    for key, file in ((LOOK_KEY, look), (GLANCE_KEY, glance)):
-        if file is not None:
-            metadata[key] = file if isinstance(file, str) else base64.b64encode(file).decode()
+    if look is not None:
+        metadata[look_key("ball")] = look if isinstance(look, str) else base64.b64encode(look).decode()
     return graph.model({"points": (FLOAT, ["n", 3])}, {"probabilities": (FLOAT, ["n", 3])}, metadata, "a test")
 
 
 def ball_manifest_with_look(**changes: Any) -> Manifest:
     """A manifest for balls with a close look, whose contract may have other entries."""
-    return ball_manifest(look=look_contract(**changes))
+    return ball_manifest(mesh="octaves", peaks=("ball",), looks=(look_contract(**changes),))

@@ -9,9 +9,6 @@ from vm_embedded.network.manifest import Manifest, ObjectClass
 KINDS = {"ball": "object", "field": "area", "line": "area"}
 """Kinds of classes by name; all others are background."""
 
-MESHES = {"plain": "ring6", "runs": "ring6", "canvas": "octaves"}
-"""A mesh for each layout."""
-
 
 def ball_manifest(*classes: str, **changes: Any) -> Manifest:
     """A manifest for balls of 0.1 m radius on mesh ring6 out to 8 m, or with other entries.

@@ -10,9 +10,11 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
+import cv2
 import pytest
 
 import vm_embedded
@@ -69,13 +71,28 @@ def test_the_command_line_page_has_every_program(docs_script):
 
 
 def test_tables_of_the_pages_are_the_published_figures():
-    from benchmarks import report, shipped, shipped_report
+    from benchmarks import report
 
-    made = report.tables()
-    made[README]["accuracy"] = shipped_report.accuracy(json.loads(shipped.RESULTS.read_text()))
+    check_parts(report.tables())
+
+
+def test_claims_of_the_readme_are_the_published_figures():
+    from benchmarks import fine_tuning, report, shipped_report
+
+    speed = report.speed(json.loads(report.RESULTS.read_text()))
+    gain = fine_tuning.sentence(json.loads(fine_tuning.RESULTS.read_text()))
+    check_parts({README: {"speed": speed, **shipped_report.readme()}, DOCS / "own-frames.md": {"fine-tuning": gain}})
+    demo = sorted((TOP / "tests" / "fixtures" / "demo").glob("image*.jpg"))
+    assert len(demo) == 12
+    assert "finds balls and field features in twelve rendered pictures" in README.read_text()
+    assert {cv2.imread(str(each)).shape for each in demo} == {(512, 640, 3)}
+
+
+def check_parts(made):
+    """Made parts, by page and by the name of their mark, are on their pages."""
     for page, parts in made.items():
-        for name, table in parts.items():
-            assert f"<!-- {name} -->\n{table}\n<!-- end -->" in page.read_text(), f"{name_of(page)}: {name}"
+        for name, text in parts.items():
+            assert f"<!-- {name} -->\n{text}\n<!-- end -->" in page.read_text(), f"{name_of(page)}: {name}"
 
 
 def test_the_changelog_has_this_version():
@@ -154,7 +171,8 @@ def test_the_training_of_the_readme_uses_the_radii_of_its_pictures():
     assert low < high
     commands = [line for line in shell_lines(README) if line.startswith(("vm-train data", "vm-evaluate runs"))]
     assert len(commands) == 2
-    assert "--set mesh.radius_of=scene" in commands[0]
+    (recipe,) = re.findall(r"--config (\S+)", commands[0])
+    assert tomllib.loads((TOP / recipe).read_text())["mesh"]["radius_of"] == "scene"
     assert "--radius-of scene" in commands[1]
 
 

@@ -44,7 +44,7 @@ vm-train check boxes --boxes --sheet boxes/a.jpg
 vm-train check frames --boxes --json data.yaml
 vm-train preview data -o data/image0000.jpg
 vm-train rate data --plot data/mask0000.png
-vm-evaluate ball-small data --list report/field.csv -o report
+vm-evaluate ball data --list report/field.csv -o report
 vm-evaluate calibrate model.onnx data -o model.onnx
 """.splitlines()
 
@@ -60,7 +60,7 @@ def folder(tmp_path_factory):
     lens = IMAGES[0].with_name(IMAGES[0].name.replace("image", "lens")).with_suffix(".yaml")
     shutil.copy(lens, made / "lens.yaml")
     shutil.copy(lens, frames / "lens0.yaml")
-    shutil.copy(model_path("ball-small"), made / "model.onnx")
+    shutil.copy(model_path("ball"), made / "model.onnx")
     (made / "kalibr.yaml").write_text(CAMCHAIN)
     (made / "outlines.json").write_text(json.dumps(OUTLINES))
     Scene(count=1).write_frames(made / "scene")

@@ -14,7 +14,7 @@ from vm_embedded.cameras.image_files import read_image
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_label.answers import AnswerFile
 from vm_label.box_folder import read_box_folder
-from vm_label.session import Session
+from vm_label.labeling import Labeling
 from vm_train.boxes.read import read_boxes
 from vm_train.data.classes import Classes
 from vm_train.data.pictures import find_pictures, read_picture
@@ -65,7 +65,7 @@ def test_vm_label_shows_the_same_crops_of_all_of_them(boxes):
     folder = read_box_folder(boxes[0])
     assert not folder.problems
     with AnswerFile(boxes[0]) as file:
-        session = Session(folder, {}, file)
+        session = Labeling(folder, {}, file)
         shares = folder.crops[0].shares
         crops = [each.id for each in folder.crops if each.shares == shares]
         assert len(crops) == len(FORMATS)

@@ -29,7 +29,7 @@ from ..shipped import classes_of
 
 PARTS = ("training", "validation")
 VALIDATION, SEED = 0.05, 0
-"""Share of the pictures for validation, and the seed of the split, as in export/networks/mesh.toml."""
+"""Share of the pictures for validation, and the seed of the split, as in export/networks/ball.toml."""
 
 MIN_RADIUS = 1.5
 """A smaller ball gets no box [px]."""

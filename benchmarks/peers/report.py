@@ -19,7 +19,7 @@ from ..report import DOCS, EXPERIMENTS, fill, machine, ms, number, table
 from . import score, train
 from .boxes import LENSES
 from .detector import TRAINED
-from .times import RESULTS, TWO_STAGE
+from .times import RESULTS, TODAY, TWO_STAGE
 
 PAGE = EXPERIMENTS / "other-detectors.md"
 
@@ -52,6 +52,21 @@ def times(found: dict[str, Any]) -> str:
     return table(heads, rows)
 
 
+def on_frames(found: dict[str, Any]) -> str:
+    """Times on all frames, also as shares of those of the last detector of TODAY."""
+    rows = []
+    for instructions, sets in found["all frames"].items():
+        for name, row in sets[next(iter(sets))].items():
+            cells = []
+            for calls in sets.values():
+                share = calls[name]["p50"] / calls[TODAY[-1]]["p50"]
+                cells += [ms(calls[name]["p50"]), ms(calls[name]["p99"]), f"{share:.2f}"]
+                cells.append(ms(calls[name]["noise"]) if "noise" in row else "-")
+            rows.append([instructions, name, *cells])
+    heads = [f"{each}: {head}" for each in sets for head in ("median", "p99", f"of {TODAY[-1]}", "noise")]
+    return table(["instructions of ONNX Runtime", "detector", *heads], rows)
+
+
 def _times(factor: float) -> str:
     return f"{factor:.1f}" if factor < 10 else f"{factor:.0f}"
 
@@ -63,7 +78,7 @@ def proposals(found: dict[str, Any]) -> str:
         for name, row in part["networks"].items()
     ]
     for name, row in part["stage"].items():
-        count = row["patches"]["glance"]
+        count = row["patches"]["ball"]
         rows.append([f"whole stage of {name}", "-", "-", f"{row['p50'] / count:.3f}"])
     return table(["network", "MFLOP", "alone", f"in a call of {part['batch']}"], rows)
 
@@ -175,9 +190,7 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
         x, ours = calls[name.partition(", same")[0]]["p50"], name in score.OURS
         y = found[name]["field"]["all"]["ap50"]
         axes.plot(x, y, "o", color="#2a7f62" if ours else "#9aa5b1")
-        left = name == "ball-small"
-        place = {"xytext": (-6 if left else 6, 0), "ha": "right" if left else "left"}
-        axes.annotate(name, (x, y), textcoords="offset points", fontsize=8, va="center", **place)
+        axes.annotate(name, (x, y), textcoords="offset points", fontsize=8, va="center", xytext=(6, 0))
         checked = found[name].get("field, sizes checked")
         if checked:
             axes.plot(x, checked["all"]["ap50"], "o", color="#9aa5b1", fillstyle="none")
@@ -193,7 +206,12 @@ def plot_times(found: dict[str, Any], calls: dict[str, Any], path: Path) -> None
 Tables = dict[str, Callable[[dict[str, Any]], str]]
 """Functions that make tables from results, by the marks of the page."""
 
-TABLES: Tables = {"machine of the times": machine, "paper's table": times, "per proposal": proposals}
+TABLES: Tables = {
+    "machine of the times": machine,
+    "paper's table": times,
+    "all frames": on_frames,
+    "per proposal": proposals,
+}
 """The tables from peer_times.json."""
 
 TRAININGS: Tables = {"peers' trainings": trainings}

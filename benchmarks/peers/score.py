@@ -41,7 +41,7 @@ RESULTS = Path(__file__).parents[1] / "peer_scores.json"
 SAME = "ball, same pictures"
 """A network with the recipe of `ball` that learned from the pictures of the peers."""
 
-OURS = ("ball", "ball-small", SAME)
+OURS = ("ball", "soccer", SAME)
 
 FIELD = "field"
 ELSEWHERE = tuple(each for each in SETS if each != FIELD)

@@ -1,7 +1,9 @@
 """Times of the paper's tab:visualmesh_performance, and per proposal: `python -m benchmarks.peers.times`.
 
 Whole calls, from frame to boxes, on one pinned core and in turns. The random weights of the other networks do not
-change their times. Writes benchmarks/peer_times.json. --quick makes fewer rounds, for a check that it works.
+change their times. The networks of the package and those that teams use today also run on all reference frames and all
+frames of ../shared/real, with ONNX Runtime as it is and restricted to AVX2 (see instruction_sets.py).
+Writes benchmarks/peer_times.json. --quick makes fewer rounds, for a check that it works.
 """
 
 from __future__ import annotations
@@ -9,11 +11,14 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import cv2
@@ -23,13 +28,14 @@ import torch
 from vm_embedded import Detector
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.cli.machine import describe_machine, rss_mib, sgemm_rate
-from vm_embedded.detection.looking import Look, chain_of
+from vm_embedded.detection.looking import Look
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_export.look_network import LookNetwork, LookShape
-from vm_export.look_weights import look_of
+from vm_export.look_weights import looks_of
 
-from ..frames import Frame, frames
+from ..frames import Frame, frame_folder, frames, read_frames
+from ..instruction_sets import SETS, copy_runtime
 from ..networks import NETWORKS, checkpoint, model_file
 from ..timing import interleaved, summary
 from .networks import PEERS, Peer, PeerDetector, loaded
@@ -42,7 +48,7 @@ RESULTS = Path(__file__).parents[1] / "peer_times.json"
 RANDOM = {"Visual Mesh 5": "5x4", "Visual Mesh 9": "9x4"}
 """The paper's networks, with random weights, by their names in benchmarks/networks.py."""
 
-PACKAGED = ("ball", "ball-small")
+PACKAGED = ("ball", "soccer")
 SINGLE = (
     Peer("YOLO v1, 448", YoloV1, 448),
     Peer("YOLO v2, 416", YoloV2, 416),
@@ -57,15 +63,15 @@ ORDER = (
 )
 """The paper's rows in its order, and ours; then what teams use today."""
 
+TODAY = ("SSDLite MobileNet v3, 320", "YOLO nano, 320")
+"""Detectors that teams use today, and the times of ours as shares of the last one."""
+
 _SLOW = {"YOLO v1, 448", "YOLO v2, 416", "YOLO v3, 416", TWO_STAGE}
 _ROW, _SLOW_ROW = 30, 3
 """Calls in a row in each turn."""
 
-_PARTS = ("glance", "look", "wide look")
-"""The networks of a close look, in the order in which they judge."""
-
-_BATCH = 40
-"""Proposals of a call: the default of the setting max_proposals."""
+_BATCH = 10
+"""Patches of a call: as many as the networks of the package look at for balls."""
 
 
 class CountedLook:
@@ -73,7 +79,6 @@ class CountedLook:
 
     def __init__(self, look: Look) -> None:
         self.contract, self.patches, self._look = look.contract, 0, look
-        self.glance = None if look.glance is None else CountedLook(look.glance)
 
     def run(self, patches: Image) -> Singles:
         self.patches += len(patches)
@@ -81,11 +86,8 @@ class CountedLook:
 
 
 def look_shapes(name: str) -> dict[str, LookShape]:
-    """The shapes of the networks of a packaged network's close look."""
-    shapes, look = [], look_of(read_model(model_path(name)))
-    while look is not None:
-        shapes, look = [look.network.shape, *shapes], look.glance
-    return dict(zip(_PARTS, shapes, strict=False))
+    """The shapes of the looks of a packaged network, by class."""
+    return {each.contract.object_class: each.network.shape for each in looks_of(read_model(model_path(name)))}
 
 
 def look_operations(shape: LookShape) -> int:
@@ -102,15 +104,14 @@ def own_work(name: str, detector: Detector, frame: Frame) -> dict[str, Any]:
     seen = detector.observe(frame.image, frame.orientation, frame.lens)
     points = len(seen.pixels)
     found: dict[str, Any] = {"points": points, "operations": detector.manifest.operations * points}
-    if detector.look is not None:
-        counted = CountedLook(detector.look)
-        look, detector.look = detector.look, counted
+    if detector.looks:
+        looks, counted = detector.looks, {name: CountedLook(each) for name, each in detector.looks.items()}
+        detector.looks = counted  # type: ignore[assignment]
         own_call(detector, frame)()
-        detector.look = look
-        chain = [each for each in chain_of(counted) if isinstance(each, CountedLook)]
-        found["patches"] = {part: each.patches for part, each in zip(_PARTS, chain, strict=False)}
+        detector.looks = looks
+        found["patches"] = {name: each.patches for name, each in counted.items()}
         found["operations"] += sum(
-            look_operations(shape) * found["patches"][part] for part, shape in look_shapes(name).items()
+            look_operations(shape) * found["patches"][each] for each, shape in look_shapes(name).items()
         )
     return found
 
@@ -130,7 +131,7 @@ def whole_calls(frame: Frame, folder: Path, rounds: int) -> dict[str, Any]:
     """
     ours: dict[str, Detector] = {}
     for name, network in RANDOM.items():
-        file = model_file(checkpoint(*NETWORKS[network]), "runs", folder / f"{network}.onnx")
+        file = model_file(checkpoint(*NETWORKS[network]), folder / f"{network}.onnx")
         ours[name] = Detector(file)
     for name in PACKAGED:
         ours[name] = Detector.from_file(name)
@@ -156,6 +157,51 @@ def whole_calls(frame: Frame, folder: Path, rounds: int) -> dict[str, Any]:
     return {name: {**times[name], "calls": rounds * (rows[name] - 1), **work[name]} for name in ORDER}
 
 
+def on_all_frames(rounds: int) -> dict[str, Any]:
+    """Times of whole calls on all frames of each set, by detector [ms], and on a frame of noise.
+
+    Each detector in turn runs over all frames, as on a robot; the first frame after another detector does not count.
+    """
+    found: dict[str, Any] = {}
+    for name, folder in (("reference", frame_folder("reference/images")), ("real", frame_folder("real/images"))):
+        if folder is None:
+            continue
+        work = read_frames(folder)
+        detectors = {each: Detector.from_file(each) for each in PACKAGED}
+        calls: dict[str, list[Callable[[], object]]] = {
+            each: [own_call(detector, frame) for frame in work] for each, detector in detectors.items()
+        }
+        for peer in PEERS:
+            if peer.name in TODAY:
+                calls[peer.name] = [partial(PeerDetector(peer).detect, frame.image) for frame in work]
+        times: dict[str, list[float]] = {each: [] for each in calls}
+        for number in range(rounds + 1):
+            for each, its_calls in calls.items():
+                its_calls[-1]()
+                for call in its_calls:
+                    started = perf_counter()
+                    call()
+                    if number:  # the first round fills caches
+                        times[each].append(1e3 * (perf_counter() - started))
+        found[name] = {each: {**summary(np.array(values)), "calls": len(values)} for each, values in times.items()}
+        for each, detector in detectors.items():
+            noise = np.random.default_rng(0).integers(0, 256, work[0].image.shape, dtype=np.uint8)
+            call = own_call(detector, replace(work[0], image=noise))
+            found[name][each]["noise"] = interleaved({"noise": call}, 10)["noise"]["p50"]
+    return found
+
+
+def with_instructions(bits: int, options: Sequence[str]) -> dict[str, Any]:
+    """The times on all frames in a process whose ONNX Runtime knows these instructions only."""
+    with tempfile.TemporaryDirectory() as folder:
+        copy_runtime(Path(folder), bits)
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join([folder, *sys.path])}
+        command = [sys.executable, "-m", "benchmarks.peers.times", "--all-frames", *options]
+        done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True, text=True)
+        found: dict[str, Any] = json.loads(done.stdout)
+        return found
+
+
 def classifier_call(classifier: PatchClassifier, count: int) -> Callable[[], object]:
     """A call of a classifier with this number of patches, with prepared inputs."""
     torch.manual_seed(0)
@@ -165,7 +211,7 @@ def classifier_call(classifier: PatchClassifier, count: int) -> Callable[[], obj
 
 
 def proposals(frame: Frame, rounds: int) -> dict[str, Any]:
-    """Times of classifiers for one patch, and for each of 40 in one call [ms]; and the stage look of whole calls."""
+    """Times of classifiers for one patch, and each of a batch in one call [ms]; and the stage look of whole calls."""
     networks: dict[str, tuple[Callable[[int], Callable[[], object]], int]] = {}
     for each in CLASSIFIERS:
         count = operations(each.network, (1, each.channels, each.side, each.side))
@@ -178,12 +224,9 @@ def proposals(frame: Frame, rounds: int) -> dict[str, Any]:
         return partial(look.run, random.integers(0, 256, (count, size, size, 3), dtype=np.uint8))
 
     for name, detector in detectors.items():
-        look, shapes = detector.look, look_shapes(name)
-        assert look is not None
-        for (part, shape), network in zip(shapes.items(), chain_of(look), strict=True):
-            # All packaged networks have the same glance, and ball and soccer the same wide look.
-            title = f"close look of {name}" if part == "look" else part
-            networks[f"{title}, {shape.size} x {shape.size}"] = partial(look_call, network), look_operations(shape)
+        for each, shape in look_shapes(name).items():
+            title = f"close look of {name} at {each}, {shape.size} x {shape.size}"
+            networks[title] = partial(look_call, detector.looks[each]), look_operations(shape)
     calls = {f"{name} / {count}": make(count) for name, (make, _) in networks.items() for count in (1, _BATCH)}
     times = interleaved(calls, rounds, row=10)
     found: dict[str, Any] = {
@@ -217,6 +260,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--output", type=Path, default=RESULTS)
+    parser.add_argument("--all-frames", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if not options.output.parent.is_dir():
         parser.error(f"there is no folder {options.output.parent}")
@@ -224,6 +268,10 @@ def main() -> None:
     os.sched_setaffinity(0, {max(cores)})
     cv2.setNumThreads(1)
     torch.set_num_threads(1)
+    rounds = 2 if options.quick else 20
+    if options.all_frames:
+        print(json.dumps(on_all_frames(rounds)))
+        return
     what, work = frames()
     frame = middle_frame(work)
     found: dict[str, Any] = {
@@ -236,6 +284,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         found["proposals"] = proposals(frame, 5 if options.quick else 40)
         found["calls"] = whole_calls(frame, Path(folder), 2 if options.quick else 10)
+    quick = ["--quick"] if options.quick else []
+    found["all frames"] = {name: with_instructions(SETS[name], quick) for name in ("AVX2", "this processor")}
     options.output.write_text(json.dumps(found, indent=1) + "\n")
 
 

@@ -89,13 +89,11 @@ struct Detection {
     float radius{};
     // unit vector from the camera to its center
     Triple bearing{};
-    // its center: where the bearing meets the plane that is parallel to the observation plane, at the height of
-    // the object's center [m]
+    // of its center, where the bearing reaches the height of an object's center [m]
     Triple position{};
     // from the camera to this center [m]
     float distance{};
-    // angle from its center to its outline. With a close look, it follows from the size that the close look saw;
-    // without one, from the size that fits the points best [rad]
+    // angle from its center to its outline, measured by the close look, or else by the points [rad]
     float angular_radius{};
     // distance that follows from `angular_radius` and the real radius [m]
     float distance_by_angle{};
@@ -112,11 +110,9 @@ struct Detection {
 struct Upright {
     // post or robot
     std::string class_name{};
-    // calibrated probability of a close look; if the class has none, the probability of a peak; if it has no
-    // peaks either, the mean probability of its points; 0 to 1
+    // calibrated probability, 0 to 1
     float confidence{};
-    // its base, which is the middle of a post's foot, or the front of a robot's foot, in the direction of its
-    // middle [m]
+    // its base: the middle of a post's foot, or the front of a robot's foot, in the direction of its middle [m]
     Pair position{};
     // from the camera to the base [m]
     float distance{};
@@ -156,11 +152,11 @@ struct Crossing {
     char kind{};
     // on the plane [m]
     Pair position{};
-    // counterclockwise from the x axis; for T the direction of the line that ends there, away from the crossing;
-    // for L halfway between its two lines, into the corner; for X the direction of either line, from 0 to a right
-    // angle [rad]
+    // counterclockwise from the x axis; T: along the line that ends there, away from the crossing; L: along the
+    // bisector of its right angle; X: along one of its lines, from 0 to a right angle [rad]
     float heading{};
-    // product of those of its two lines, and down to half of it if one ends in front of the crossing; 0 to 1
+    // product of the confidences of its two lines, and less, down to half, if a line ends before the crossing; 0
+    // to 1
     float confidence{};
 };
 

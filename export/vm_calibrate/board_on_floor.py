@@ -10,7 +10,7 @@ from vm_embedded.geometry.lens import Lens, Size
 
 from .board_poses import first_pose
 from .floor_pose import PoseFit, numbers_of, orientation_of, pose_fit
-from .frames import Sighting
+from .frames import BoardSighting
 from .shared_fit import SharedFit, fit_shared
 
 _OUTLIER = 1.0
@@ -22,7 +22,7 @@ _WRONG = 3.0
 _ADVICE = "put a larger board, or put it nearer, and film it in several places on the floor"
 
 
-def fit_board_on_floor(sightings: list[Sighting], lens: Lens, size: Size, thickness: float) -> PoseFit:
+def fit_board_on_floor(sightings: list[BoardSighting], lens: Lens, size: Size, thickness: float) -> PoseFit:
     """The pose from one or more places of a board in pictures of a size [px].
 
     thickness: height of the printed side over the floor [m]. Raises InputError if the board is not on the floor below
@@ -46,7 +46,7 @@ def fit_board_on_floor(sightings: list[Sighting], lens: Lens, size: Size, thickn
 class _Problem:
     """The corners of boards on the floor, as a function of the camera's pose and of the boards' places."""
 
-    def __init__(self, sightings: list[Sighting], lens: Lens, size: Size, thickness: float) -> None:
+    def __init__(self, sightings: list[BoardSighting], lens: Lens, size: Size, thickness: float) -> None:
         self.sightings, self.lens, self.size, self.thickness = sightings, lens, size, thickness
         self.frame: Indices = np.repeat(
             np.arange(len(sightings), dtype=np.int32), [len(each.corners.pixels) for each in sightings]
@@ -72,7 +72,7 @@ class _Problem:
         own = np.stack([self._place(shared, rotation, shift) for rotation, shift in poses])
         return fit_shared(self._residuals, np.repeat(self.frame, 2), shared, own, _OUTLIER)
 
-    def _alone(self, sighting: Sighting) -> tuple[Floats, Floats]:
+    def _alone(self, sighting: BoardSighting) -> tuple[Floats, Floats]:
         """Rotation and translation from a board to the camera."""
         try:
             return first_pose(sighting.corners.places, self.lens.unproject(sighting.corners.pixels, self.size))

@@ -23,7 +23,7 @@ from .board_drawing import board_svg
 from .board_on_floor import fit_board_on_floor
 from .boards import Board, board_from
 from .floor_pose import PoseFit
-from .frames import Sighting, choose, find_boards
+from .frames import BoardSighting, choose, find_boards
 from .kalibr import read_kalibr
 from .lens_fit import LensFit, fit_lens
 from .report import lens_lines, lens_warnings, pose_lines
@@ -96,7 +96,7 @@ def _board(options: argparse.Namespace, square: float | None) -> Board:
     return board_from(options.board, side, options.charuco, options.marker, options.legacy)
 
 
-def _fit(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
+def _fit(kind: str, sightings: list[BoardSighting], size: Size) -> LensFit:
     """The fitted lens of a kind; for `auto` the better one of pinhole and fisheye. Raises InputError."""
     count = len(sightings)
     if kind != "auto":

@@ -27,7 +27,7 @@ _BLUR = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class Sighting:
+class BoardSighting:
     """A board in a frame. name: of the frame. corners: of the board. blur: width of the edges on the board [px]."""
 
     name: str
@@ -40,7 +40,7 @@ class Search:
     """What a search for a board found. size: of the frames [px]. left_out: reasons, and the number of their frames."""
 
     size: Size
-    sightings: list[Sighting]
+    sightings: list[BoardSighting]
     left_out: Counter[str] = field(default_factory=Counter)
 
 
@@ -65,7 +65,7 @@ def find_boards(source: str, board: Board) -> Search:
             )
         corners = board.find(gray)
         if corners is not None:
-            search.sightings.append(Sighting(name, corners, _edge_width(gray, corners.pixels)))
+            search.sightings.append(BoardSighting(name, corners, _edge_width(gray, corners.pixels)))
             continue
         left_out["without the board"] += 1
         sharpness = _sharpness(gray)
@@ -78,7 +78,7 @@ def find_boards(source: str, board: Board) -> Search:
     return search
 
 
-def choose(search: Search, most: int) -> list[Sighting]:
+def choose(search: Search, most: int) -> list[BoardSighting]:
     """At most `most` sharp sightings, whose boards differ in place, size and tilt; counts the others as left out."""
     limit = _BLUR * float(np.median([each.blur for each in search.sightings]))
     sharp = [each for each in search.sightings if each.blur <= limit]

@@ -11,7 +11,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens import Lens, Size
 
 from .board_poses import first_pose, moved
-from .frames import Sighting
+from .frames import BoardSighting
 from .lens_kinds import LENS_KINDS, LensKind, with_fov_of_picture
 from .shared_fit import SharedFit, fit_shared
 
@@ -40,9 +40,9 @@ class LensFit:
     lens: Lens
     focal_lengths: Floats
     center: Floats
-    frames: tuple[Sighting, ...]
+    frames: tuple[BoardSighting, ...]
     errors: Floats
-    outliers: tuple[tuple[Sighting, float], ...]
+    outliers: tuple[tuple[BoardSighting, float], ...]
 
     @property
     def error(self) -> float:
@@ -56,7 +56,7 @@ class LensFit:
         return float(np.median([*self.errors, *(error for _, error in self.outliers)]))
 
 
-def fit_lens(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
+def fit_lens(kind: str, sightings: list[BoardSighting], size: Size) -> LensFit:
     """Fit a lens of a kind to sightings in pictures of a size [px]; frames that disagree with the others are left out.
 
     Raises InputError for too few frames and for corners that this kind of lens can't have.
@@ -66,7 +66,7 @@ def fit_lens(kind: str, sightings: list[Sighting], size: Size) -> LensFit:
             f"a lens needs the board in at least {FEWEST_FRAMES} usable frames, better 20, but there are "
             f"{len(sightings)}; show it in more places, at several distances and tilts"
         )
-    outliers: list[tuple[Sighting, float]] = []
+    outliers: list[tuple[BoardSighting, float]] = []
     numbers = None
     while True:
         problem = _Problem(LENS_KINDS[kind], sightings, size)
@@ -87,9 +87,9 @@ def _result(
     kind: str,
     fit: SharedFit,
     size: Size,
-    frames: list[Sighting],
+    frames: list[BoardSighting],
     errors: Floats,
-    outliers: list[tuple[Sighting, float]],
+    outliers: list[tuple[BoardSighting, float]],
 ) -> LensFit:
     known, deviations = LENS_KINDS[kind], fit.deviations()
     count = known.focal_count
@@ -109,7 +109,7 @@ def _result(
 class _Problem:
     """The reprojection of the corners of all sightings, as a function of the lens and of the boards' poses."""
 
-    def __init__(self, kind: LensKind, sightings: list[Sighting], size: Size) -> None:
+    def __init__(self, kind: LensKind, sightings: list[BoardSighting], size: Size) -> None:
         self.kind, self.size, self.sightings = kind, size, sightings
         self.frame: Indices = np.repeat(
             np.arange(len(sightings), dtype=np.int32), [len(each.corners.pixels) for each in sightings]

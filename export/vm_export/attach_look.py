@@ -11,10 +11,9 @@ import torch
 import vm_embedded
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.look_contract import LookContract
-from vm_embedded.network.look_test import LookTest, made_patches
+from vm_embedded.network.look_contract import LookContract, look_key
+from vm_embedded.network.look_example import LookTest, made_patches
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
-from vm_embedded.network.model_file import LookFiles
 
 from .look_checkpoint import LookCheckpoint
 from .look_graph import look_model
@@ -34,46 +33,24 @@ _PARTS = 256
 
 
 def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[bytes, float]:
-    """A model file's bytes with a look network and its glances, and the largest difference of an answer to torch.
+    """A model file's bytes with a look network, and the largest difference of an answer to torch.
 
-    content, manifest: of the model file. The look network for the same object or upright is replaced. The examples
-    become the self-tests. Raises ModelError if the look judges another class than the file's objects and uprights.
+    content, manifest: of the model file. The look network for the same class is replaced. The examples become the
+    self-test. Raises ModelError if the file's network has no peaks for the class.
     """
-    contract, files, difference = _exported(look)
-    replaced = [each for each in manifest.looks if each.keys[0] == contract.keys[0]]
-    entries: dict[str, str | None] = {key: None for each in replaced for key in each.keys}
-    entries |= {key: base64.b64encode(file).decode() for key, file in zip(contract.keys, files, strict=True)}
-    if contract.upright_radius:
-        others = tuple(each for each in manifest.upright_looks if each.object_class != contract.object_class)
-        changed = replace(manifest, upright_looks=(*others, contract))
-    else:
-        changed = replace(manifest, look=contract)
-    return with_metadata(content, entries | {METADATA_KEY: changed.as_json()}), difference
-
-
-def _exported(look: LookCheckpoint) -> tuple[LookContract, LookFiles, float]:
-    """The contract of a look network with its self-test, the ONNX files of its chain, and the largest difference to
-    torch. The contracts of its glances have their self-tests, too."""
-    content = look_model(look.network.eval())
-    difference = largest_look_difference(content, look)
-    glance: LookContract | None = None
-    files: LookFiles = ()
-    if look.glance is not None:
-        glance, files, before = _exported(look.glance)
-        difference = float(np.maximum(difference, before))
-    contract = replace(
-        look.contract,
-        self_test=_self_test(look),
-        glance=glance,
-        provenance={**look.contract.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"},
-    )
-    return contract, (content, *files), difference
+    file = look_model(look.network.eval())
+    difference = largest_look_difference(file, look)
+    provenance = {**look.contract.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
+    contract = replace(tested_contract(look), provenance=provenance)
+    others = tuple(each for each in manifest.looks if each.object_class != contract.object_class)
+    changed = replace(manifest, looks=(*others, contract))
+    entries = {look_key(contract.object_class): base64.b64encode(file).decode(), METADATA_KEY: changed.as_json()}
+    return with_metadata(content, entries), difference
 
 
 def tested_contract(look: LookCheckpoint) -> LookContract:
-    """The contract of a look network with its self-test, and with that of its glance."""
-    glance = None if look.glance is None else tested_contract(look.glance)
-    return replace(look.contract, self_test=_self_test(look), glance=glance)
+    """The contract of a look network with its self-test."""
+    return replace(look.contract, self_test=_self_test(look))
 
 
 def _self_test(look: LookCheckpoint) -> LookTest:
@@ -102,10 +79,8 @@ def _tested(network: LookNetwork, patches: Image) -> LookTest:
 
 def detached(content: bytes, manifest: Manifest) -> bytes:
     """A model file's bytes without its look networks. content, manifest: of the model file."""
-    described = replace(manifest, look=None, upright_looks=()).as_json()
-    return with_metadata(
-        content, {key: None for each in manifest.looks for key in each.keys} | {METADATA_KEY: described}
-    )
+    removed: dict[str, str | None] = {look_key(each.object_class): None for each in manifest.looks}
+    return with_metadata(content, removed | {METADATA_KEY: replace(manifest, looks=()).as_json()})
 
 
 def largest_look_difference(content: bytes, look: LookCheckpoint) -> float:

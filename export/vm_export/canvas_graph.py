@@ -1,4 +1,4 @@
-"""The graph of the layout `canvas`: ordinary convolutions, all in the block format of ONNX Runtime.
+"""The graph of a network on a canvas: ordinary convolutions, all in the block format of ONNX Runtime.
 
 vm_embedded/network/canvas_layout.py prepares its inputs. Batch normalization is folded into the weights.
 """
@@ -22,7 +22,7 @@ _LARGEST = 60.0
 
 
 def canvas_model(network: CanvasNetwork, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in the layout `canvas`.
+    """The bytes of an ONNX model.
 
     Inputs: points (1, 3, rows, columns) float32 and shown (1, 1, rows, columns) bool, as CanvasLayout gives them.
     Output: probabilities (1, C + 4 P, rows, columns) float32, which end with four numbers for each class with peaks.
@@ -54,11 +54,12 @@ def canvas_model(network: CanvasNetwork, manifest: Manifest) -> bytes:
     limits = [graph.constant("lowest", -_LARGEST), graph.constant("highest", _LARGEST)]
     powers = graph.node("Exp", [graph.node("Clip", [head, *limits], "head.limited")], "powers")
     sums = graph.node("ReduceSum", [powers, graph.constant("classes", [1])], "sums")
-    if network.peaks is None:
+    if network.seek is None or network.peaks is None:
         graph.node("Div", [powers, sums], "probabilities")
     else:
         shares = graph.node("Div", [powers, sums], "shares")
-        peaks = writer.convolve("peaks", x, _array(network.peaks.weight), _array(network.peaks.bias))
+        sought = writer.separable("seek", x, network.seek)
+        peaks = writer.convolve("peaks", sought, _array(network.peaks.weight), _array(network.peaks.bias))
         graph.node("Concat", [shares, peaks], "probabilities", axis=1)
     sizes: list[int | str] = ["rows", "columns"]
     return graph.model(
@@ -96,7 +97,8 @@ def read_canvas(constants: Mapping[str, Singles]) -> CanvasNetwork:
 
     load("stem", network.stem, network.stem_norm)
     load("head", network.head)
-    if network.peaks is not None:
+    if network.seek is not None and network.peaks is not None:
+        load_block("seek", network.seek)
         load("peaks", network.peaks)
     for level, blocks in enumerate(network.blocks):
         for number, block in enumerate(blocks):

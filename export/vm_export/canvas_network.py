@@ -2,7 +2,8 @@
 
 A convolution is separable: 3 x 3 cells in each channel by itself, then a mix of the channels. Three times the canvas is
 halved, so that a cell sees far around; then the answers of the coarser canvases are added to the finer ones (a U-Net:
-Ronneberger and others, 2015). All channels come in multiples of eight, which ONNX Runtime computes fastest.
+Ronneberger and others, 2015). Peaks have a separable convolution of their own, since they look for single cells where
+classes look for areas. All channels come in multiples of eight, which ONNX Runtime computes fastest.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import cast
 
-import numpy as np
 import torch
 from torch import nn
 
@@ -74,6 +74,7 @@ class CanvasNetwork(nn.Module):
         self.lift = nn.ModuleList(Mix(coarse, fine) for fine, coarse in steps)
         self.up = nn.ModuleList(Separable(fine, fine) for fine, _ in steps)
         self.head = Mix(widths[0], shape.classes)
+        self.seek = Separable(widths[0], widths[0]) if shape.peaks else None
         self.peaks = Mix(widths[0], PEAK_OUTPUTS * shape.peaks) if shape.peaks else None
         if self.peaks is not None:
             assert self.peaks.bias is not None
@@ -102,7 +103,9 @@ class CanvasNetwork(nn.Module):
             lifted = nn.functional.interpolate(self.lift[level](x), scale_factor=2.0, mode="nearest")
             x = self.up[level](torch.relu(finer[level] + lifted))
         logits: torch.Tensor = self.head(x)
-        return logits if self.peaks is None else torch.cat([logits, self.peaks(x)], dim=1)
+        if self.seek is None or self.peaks is None:
+            return logits
+        return torch.cat([logits, self.peaks(self.seek(x))], dim=1)
 
     def logits(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
         """Outputs (n + 1, C + 4 P) before the softmax, from points (n + 1, 3) and their cells (n, 2) on strips.
@@ -111,13 +114,13 @@ class CanvasNetwork(nn.Module):
         runtime places them.
         """
         count = len(cells)
-        _, shape, slot = place_on_canvas(cells.cpu().numpy(), np.ones(count, dtype=bool))
-        slots = torch.from_numpy(slot.astype(np.int64)).to(points.device)
+        _, shape, found = place_on_canvas(cells.cpu().numpy())
+        places = torch.tensor(found).to(points.device)
         canvas = torch.zeros((4, shape[0] * shape[1]), dtype=points.dtype, device=points.device)
-        canvas[:3, slots], canvas[3, slots] = points[:count].T, 1.0
+        canvas[:3, places], canvas[3, places] = points[:count].T, 1.0
         canvas = canvas.reshape(1, 4, *shape)
-        found = self.canvas_logits(canvas[:, :3], canvas[:, 3:])[0].flatten(1)
-        return torch.cat([found[:, slots], torch.zeros_like(found[:, :1])], dim=1).T
+        outputs = self.canvas_logits(canvas[:, :3], canvas[:, 3:])[0].flatten(1)
+        return torch.cat([outputs[:, places], torch.zeros_like(outputs[:, :1])], dim=1).T
 
     def probabilities(self, points: torch.Tensor, cells: torch.Tensor) -> torch.Tensor:
         """Probabilities (n + 1, C); see `logits`."""

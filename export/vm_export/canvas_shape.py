@@ -9,7 +9,7 @@ from typing import Any
 from vm_embedded.errors import InputError
 from vm_embedded.network.manifest import PEAK_OUTPUTS
 
-COARSER = ((1.5, 1), (2.0, 2), (3.0, 2))
+COARSER = ((2.0, 1), (4.0, 2), (6.0, 2))
 """Of each coarser canvas: its channels, as a multiple of those of the finest one, and its separable convolutions."""
 
 _BLOCK = 8
@@ -62,6 +62,8 @@ class CanvasShape:
         """Multiplications and additions for each cell, without activations."""
         widths, depths = self.widths, self.depths
         total = 9.0 * 4 * widths[0] + widths[0] * self.outputs
+        if self.peaks:
+            total += widths[0] * (9 + widths[0])
         for level, (width, depth) in enumerate(zip(widths, depths, strict=True)):
             share = 0.25**level
             separable = width * (9 + width)

@@ -17,7 +17,7 @@ from .attach_look import detached, tested_contract
 from .calibrated_peaks import with_calibrated_peaks
 from .export import with_looks
 from .look_checkpoint import LookCheckpoint
-from .look_weights import look_of, upright_looks_of
+from .look_weights import looks_of
 from .metadata import with_metadata
 from .network_weights import network_of
 from .self_testing import strong_self_test
@@ -45,7 +45,7 @@ def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckp
     read = read_model(model)
     content, difference = with_looks(path, read.content, looks)
     if not looks:
-        if read.look is None and not read.upright_looks:
+        if not read.looks:
             raise ModelError(f"{model} has no close look to remove")
         content = detached(read.content, read.manifest)
     return ChangedLooks(difference, _finish(path, content, read.canary))
@@ -97,7 +97,6 @@ def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) ->
     manifest = replace(
         read.manifest,
         self_test=strong_self_test(network_of(read).network, read.manifest),
-        look=None if read.look is None else tested_contract(look_of(read)),
-        upright_looks=tuple(tested_contract(each) for each in upright_looks_of(read)),
+        looks=tuple(map(tested_contract, looks_of(read))),
     )
     write_file(Path(path), with_canary(with_metadata(read.content, {METADATA_KEY: manifest.as_json()}), canary))

@@ -12,7 +12,7 @@ from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Pars
 from vm_embedded.errors import InputError, VisualMeshError, not_installed
 from vm_embedded.files import check_writable
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.manifest import EDGES, LAYOUTS, Manifest
+from vm_embedded.network.manifest import EDGES, Manifest
 from vm_embedded.network.model_file import read_model
 
 if TYPE_CHECKING:
@@ -39,11 +39,6 @@ def parser() -> argparse.ArgumentParser:
         "-o", "--output", type=Path, help="file to write; default: the name of the model with .onnx or .yaml"
     )
     parser.add_argument(
-        "--layout",
-        choices=LAYOUTS,
-        help="write one file, in this layout; default: the fastest layout, and NAME.plain.onnx for other ONNX runtimes",
-    )
-    parser.add_argument(
         "--to-yaml", action="store_true", help="write the format of the reference implementation instead"
     )
     looks = parser.add_mutually_exclusive_group()
@@ -55,13 +50,6 @@ def parser() -> argparse.ArgumentParser:
         "a model file (.onnx, or the name of a network of the package), whose close looks at these classes are taken",
     )
     looks.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close looks")
-    parser.add_argument(
-        "--look-above",
-        type=float,
-        metavar="P",
-        help="the mesh points from this probability on are proposed to the look; default: the probability that the "
-        "look was trained with. A network of many classes needs a lower one, because it is less sure of each class",
-    )
     parser.add_argument(
         "--canary",
         type=Path,
@@ -129,20 +117,13 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _checked_output(options: argparse.Namespace) -> Path:
-    """The file to write. Raises InputError if it, or its portable copy, can't be written, or for a wrong suffix."""
+    """The file to write. Raises InputError if it can't be written, or for a wrong suffix."""
     output: Path = options.output or options.model.with_suffix(".yaml" if options.to_yaml else ".onnx")
-    one_file = options.to_yaml or options.layout or _is_model_file(options.model)
-    for path in (output,) if one_file else (output, _portable(output)):
-        check_writable(path, (options.model, options.look, *(options.canary or ())))
+    check_writable(output, (options.model, options.look, *(options.canary or ())))
     suffixes = (".yaml", ".yml") if options.to_yaml else (".onnx",)
     if output.suffix not in suffixes:
         raise InputError(f"--output must end in {suffixes[0]}, not {output}")
     return output
-
-
-def _portable(output: Path) -> Path:
-    """The file for other ONNX runtimes, beside the one to write."""
-    return output.with_suffix(".plain" + output.suffix)
 
 
 def _change_model(options: argparse.Namespace, output: Path, canary: CanaryPicture | None) -> None:
@@ -162,7 +143,7 @@ def _change_model(options: argparse.Namespace, output: Path, canary: CanaryPictu
 
 def _export_checkpoint(options: argparse.Namespace, output: Path, canary: CanaryPicture | None) -> None:
     """Write a checkpoint, or a network of the reference implementation, as model files or in the reference's format."""
-    from .export import export, fastest_layout
+    from .export import export
     from .reference import write_reference
 
     checkpoint = _load(options.model, _overrides(options))
@@ -172,11 +153,7 @@ def _export_checkpoint(options: argparse.Namespace, output: Path, canary: Canary
         print(f"{output}: written in the format of the reference implementation")
         return
     looks = _read_looks(options, checkpoint.manifest)
-    layout = options.layout or fastest_layout(checkpoint)
-    files = {_portable(output): "plain"} if options.layout is None and layout == "runs" else {}
-    files[output] = layout
-    for path, layout in files.items():
-        _print_written(path, f"layout {layout}", looks, export(checkpoint, path, layout, looks, canary))
+    _print_written(output, "mesh network", looks, export(checkpoint, output, looks, canary))
 
 
 def _read_looks(options: argparse.Namespace, manifest: Manifest) -> list[LookCheckpoint]:
@@ -187,11 +164,8 @@ def _read_looks(options: argparse.Namespace, manifest: Manifest) -> list[LookChe
     if options.look is None:
         return []
     if _is_model_file(options.look):
-        looks = looks_for(manifest, read_model(options.look))
-    else:
-        looks = [LookCheckpoint.load(options.look)]
-    above = options.look_above
-    return looks if above is None else [each.for_points_above(above) for each in looks]
+        return looks_for(manifest, read_model(options.look))
+    return [LookCheckpoint.load(options.look)]
 
 
 def _is_model_file(path: Path) -> bool:
@@ -203,18 +177,14 @@ def _check_options(options: argparse.Namespace) -> None:
     for each in (options.model, options.output):
         if each is not None and not each.name:
             raise InputError(f"{each} is a folder: give a file")
-    if options.look_above is not None and not options.look:
-        raise InputError("--look-above is for the look that --look attaches; add --look, or leave it out")
-    if options.look_above is not None and not 0.0 <= options.look_above <= 0.99:
-        raise InputError(f"--look-above must be from 0 to 0.99, not {options.look_above:g}")
-    if options.to_yaml and (options.layout or options.look or options.canary):
-        option = "--layout" if options.layout else "--look" if options.look else "--canary"
+    if options.to_yaml and (options.look or options.canary):
+        option = "--look" if options.look else "--canary"
         raise InputError(f"{option} is for ONNX files; leave it out with --to-yaml")
     if not _is_model_file(options.model):
         if options.no_look:
             raise InputError(f"--no-look is for model files (.onnx); leave it out for {options.model}")
         return
-    names = ("layout", "to_yaml", "intersections", "radius", "object_radius", "max_distance", "edge", "classes")
+    names = ("to_yaml", "intersections", "radius", "object_radius", "max_distance", "edge", "classes")
     values = {f"--{name.replace('_', '-')}": getattr(options, name) for name in names}
     given = [option for option, value in values.items() if value is not None and value is not False]
     if given:
@@ -235,10 +205,9 @@ def _check_options(options: argparse.Namespace) -> None:
 def _print_written(path: Path, content: str, looks: Sequence[LookCheckpoint], difference: float | None) -> None:
     """Print a line about a written file: its networks, its size, and the difference to torch of those that are new."""
     parts = [content]
-    for look in looks:
-        for name, each in zip(look.contract.names, look.contract.chain, strict=True):
-            channels = ", ".join(map(str, each.channels))
-            parts.append(f"{name} at {each.object_class} ({each.size} x {each.size}, channels {channels})")
+    for each in (look.contract for look in looks):
+        channels = ", ".join(map(str, each.channels))
+        parts.append(f"close look at {each.object_class} ({each.size} x {each.size}, channels {channels})")
     parts.append(f"{path.stat().st_size / 1000:.1f} kB")
     if difference is not None:
         parts.append(f"largest difference to torch {difference:.1e}")

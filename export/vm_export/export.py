@@ -15,10 +15,10 @@ from vm_embedded.arrays import Indices, Singles
 from vm_embedded.errors import ModelError
 from vm_embedded.files import write_file
 from vm_embedded.mesh.grids import STEPS, lattice_neighbors
+from vm_embedded.network.example import SelfTest
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile, parse_model
-from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
 from .attach_canary import CanaryPicture, with_canary
@@ -29,61 +29,37 @@ from .checkpoint import Checkpoint
 from .look_checkpoint import LookCheckpoint
 from .mesh_networks import MeshNetwork, model_outputs
 from .plain_graph import plain_model
-from .runs_graph import runs_model
 from .self_testing import strong_self_test
 
 LARGEST_DIFFERENCE = 1e-4
 """Largest difference of an answer that is allowed between ONNX Runtime and torch."""
 
-_WIDEST = {"convolution": 64, "separable": 32, "dense": 1024}
-"""The largest width of a layer, by kind, for which the layout `runs` is faster. Convolutions and separable ones are
-measured (experiments/speed.md); dense layers have no look-ups, so their width hardly matters."""
-
 _CHECKED_POINTS = (1, 2, 7, 64, 1000, 5000)
 
 
-def fastest_layout(checkpoint: Checkpoint) -> str:
-    """The fastest layout for a network of this shape: runs or plain, and canvas for a network on strips.
-
-    The layout `runs` saves look-ups and costs multiplications. A convolution multiplies three slots for each group: for
-    ring6, 9 places for 7 weights. A separable convolution becomes a full one. So the layout `runs` gains less for wider
-    layers.
-    """
-    if isinstance(checkpoint.network, CanvasNetwork):
-        return "canvas"
-    narrow = all(layer.width <= _WIDEST[layer.kind] for layer in checkpoint.network.shape.layers)
-    return "runs" if narrow and checkpoint.manifest.edge == "hard" else "plain"
-
-
 def onnx_model(network: MeshNetwork, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in the manifest's layout, of standard operators only."""
-    if isinstance(network, CanvasNetwork):
-        return canvas_model(network, manifest)
-    return (plain_model if manifest.layout == "plain" else runs_model)(network, manifest)
+    """The bytes of an ONNX model, of standard operators only."""
+    return canvas_model(network, manifest) if isinstance(network, CanvasNetwork) else plain_model(network, manifest)
 
 
 def export(
     checkpoint: Checkpoint,
     path: str | Path,
-    layout: str | None = None,
     looks: Sequence[LookCheckpoint] = (),
     canary: CanaryPicture | None = None,
 ) -> float:
     """Write the model file of a checkpoint and return the largest difference to torch of an answer.
 
-    layout: one of LAYOUTS; default the fastest one. looks: look networks to write into the same file. canary: a
-    picture that becomes its canary. ONNX Runtime runs the networks before the file is written. Raises ModelError if an
-    answer differs by more than LARGEST_DIFFERENCE, the layout does not fit the manifest, or a look does not fit its
-    classes, and InputError if the picture does not show every class, or the file can't be written.
+    looks: look networks to write into the same file. canary: a picture that becomes its canary. ONNX Runtime runs the
+    networks before the file is written. Raises ModelError if an answer differs by more than LARGEST_DIFFERENCE, or a
+    look does not fit the classes, and InputError if the picture does not show every class, or the file can't be
+    written.
     """
-    layout = layout or fastest_layout(checkpoint)
     network = checkpoint.network.eval()
     provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
     manifest = replace(
         checkpoint.manifest,
-        look=None,
-        upright_looks=(),
-        layout=layout,
+        looks=(),
         operations=network.shape.operations,
         provenance=provenance,
     )

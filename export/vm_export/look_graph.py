@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.network.look_test import ANSWERS
+from vm_embedded.network.look_example import ANSWERS
 
 from .eight_bits import integers_of
 from .look_network import NOISE_FLOOR, LookNetwork
@@ -26,10 +26,15 @@ def look_model(network: LookNetwork) -> bytes:
     x = _write_normalization(graph, size)
     for index, layer in enumerate(network.typed_convolutions):
         kernel, bias = weights[f"convolutions.{index}.weight"], weights[f"convolutions.{index}.bias"]
-        step, columns = layer.stride[0], 1
+        side, step, columns = layer.kernel_size[0], layer.stride[0], 1
         if index == 0:
             kernel, columns = kernel.transpose(0, 2, 3, 1).reshape(-1, 1, 3, 9), 3
-        geometry = {"kernel_shape": [3, 3 * columns], "pads": [1, columns] * 2, "strides": [step, columns * step]}
+        geometry = {
+            "kernel_shape": [side, side * columns],
+            "pads": [side // 2, side // 2 * columns] * 2,
+            "strides": [step, step * columns],
+            "group": layer.groups,
+        }
         x = _write_layer(graph, "Conv", f"layer{index}", x, kernel, bias, **geometry)
         x = graph.node("Relu", [x], f"layer{index}.activation")
     x = graph.node("Flatten", [x], "flat", axis=1)

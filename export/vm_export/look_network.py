@@ -10,7 +10,7 @@ import torch
 from torch import nn
 
 from vm_embedded.errors import InputError
-from vm_embedded.network.look_test import ANSWERS
+from vm_embedded.network.look_example import ANSWERS
 
 _WIDEST = 1024
 """Limit of every width."""
@@ -24,7 +24,8 @@ class LookShape:
     """The layers of a look network.
 
     size: samples along each side of a patch, 8 to 128.
-    channels: of the convolutions at a half, a quarter and an eighth of the patch's resolution.
+    channels: of the convolutions at a half, a quarter and an eighth of the patch's resolution. At a quarter, there is
+        one more, a separable one.
     hidden: units of the layer before the answers; 0 means as many as the last convolution has channels.
 
     Raises InputError for values out of range.
@@ -87,7 +88,8 @@ class LookNetwork(nn.Module):
             [
                 nn.Conv2d(3, half, 3, stride=2, padding=1),
                 nn.Conv2d(half, quarter, 3, stride=2, padding=1),
-                nn.Conv2d(quarter, quarter, 3, padding=1),
+                nn.Conv2d(quarter, quarter, 3, padding=1, groups=quarter),
+                nn.Conv2d(quarter, quarter, 1),
                 nn.Conv2d(quarter, eighth, 3, stride=2, padding=1),
             ]
         )

@@ -11,7 +11,6 @@ from onnx import numpy_helper
 
 from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError, ModelError
-from vm_embedded.mesh.mesh import Groups
 from vm_embedded.network.model_file import ModelFile
 
 from .canvas_graph import read_canvas
@@ -20,10 +19,9 @@ from .export import LARGEST_DIFFERENCE, largest_difference
 from .mesh_networks import MeshNetwork
 from .network import Network
 from .network_shape import Layer, NetworkShape
-from .runs_graph import ACTIVATION_PARTS, Activation, kernel_places
 
 _OPERATORS = {"Selu": "selu", "Relu": "relu", "Elu": "elu", "Tanh": "tanh", "Softmax": "softmax", "Sigmoid": "sigmoid"}
-"""Activations by the operators of the layout `plain`."""
+"""Activations by their operators."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,28 +57,19 @@ class _Graph:
 
 
 def network_of(model: ModelFile) -> Checkpoint:
-    """The mesh network of a model file that vm-export wrote, in any layout; its answers are the same.
-
-    In the layout `runs`, a separable convolution comes back as a full one. Raises ModelError for files of other
-    programs.
-    """
+    """The mesh network of a model file that vm-export wrote; its answers are the same. Raises ModelError for files of
+    other programs."""
     manifest, foreign = model.manifest, f"{model.path}: its mesh network has other layers than vm-export writes"
     try:
         graph = _Graph(model.content)
-        network: MeshNetwork
-        if manifest.layout == "canvas":
-            network = read_canvas(graph.constants)
-        else:
-            layers = _plain(graph) if manifest.layout == "plain" else _runs(graph, manifest.model.groups)
-            network = _network(layers, manifest.neighbors)
+        on_graph = not manifest.on_canvas
+        network: MeshNetwork = _network(_plain(graph), manifest.neighbors) if on_graph else read_canvas(graph.constants)
         difference = largest_difference(model.content, network, manifest)
     except (KeyError, IndexError, ValueError, RuntimeError, InputError) as error:
         raise ModelError(f"{foreign}: {error}") from error
     if not difference <= LARGEST_DIFFERENCE:
         raise ModelError(f"{foreign}: its answers differ from those of the layers by {difference:.2g}")
-    layout = "canvas" if manifest.layout == "canvas" else "plain"
-    bare = replace(manifest, layout=layout, operations=0, self_test=None, look=None, upright_looks=())
-    return Checkpoint(network, bare)
+    return Checkpoint(network, replace(manifest, operations=0, self_test=None, looks=()))
 
 
 def _network(layers: list[_Weights], neighbors: int) -> Network:
@@ -108,46 +97,3 @@ def _plain(graph: _Graph) -> list[_Weights]:
             kind = "convolution" if f"{name}.gathered" in graph.nodes else "dense"
         found.append(_Weights(Layer(kind, len(bias), _OPERATORS[node.op_type]), kernel, bias, depthwise))
     return found
-
-
-def _runs(graph: _Graph, groups: Groups) -> list[_Weights]:
-    """The layers of runs_graph.runs_model, whose rewritings are undone. Raises KeyError for other graphs."""
-    found, before = [], Activation()
-    for name in graph.layers:
-        kernel, bias = graph.weights(f"{name}.kernel"), graph.weights(f"{name}.bias")[:, 0]
-        is_dense = f"{name}.window" not in graph.nodes
-        kernel = (kernel[:, None] if is_dense else _unfolded(kernel, groups)) / before.scale
-        is_last = name == graph.layers[-1]
-        activation = _head(graph) if is_last else _activation(graph, name)
-        parts = Activation() if is_last else ACTIVATION_PARTS[activation]
-        bias = bias - parts.bias - before.constant * kernel.sum(axis=(1, 2))
-        if is_last and _is_difference(graph):
-            kernel, bias = np.concatenate([-kernel, kernel]) / 2.0, np.concatenate([-bias, bias]) / 2.0
-        layer = Layer("dense" if is_dense else "convolution", len(bias), activation)
-        found.append(_Weights(layer, kernel.reshape(len(kernel), -1), bias))
-        before = parts
-    return found
-
-
-def _unfolded(weights: Floats, groups: Groups) -> Floats:
-    """The inverse of how runs_graph lays out a kernel: (outputs, N + 1, inputs) from (outputs * G, 3 * inputs)."""
-    taps = weights.reshape(-1, len(groups), weights.shape[1] // 3, 3)
-    return np.stack([taps[:, group, :, 1 - shift] for _, group, shift in sorted(kernel_places(groups))], axis=1)
-
-
-def _activation(graph: _Graph, name: str) -> str:
-    """The activation of a layer before the last one."""
-    node = graph.nodes[f"{name}.activation"]
-    if node.op_type != "Add":
-        return _OPERATORS[node.op_type]
-    return str(graph.nodes[f"{name}.straight"].input[1]).removesuffix(".corner")
-
-
-def _head(graph: _Graph) -> str:
-    """The activation of the last layer."""
-    return "softmax" if graph.nodes["probabilities"].op_type == "Div" or _is_difference(graph) else "sigmoid"
-
-
-def _is_difference(graph: _Graph) -> bool:
-    """Whether the last layer gives only the difference of two logits, for a softmax of two classes."""
-    return bool(graph.nodes["probabilities"].input[0] == "head.both")

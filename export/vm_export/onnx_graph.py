@@ -11,12 +11,11 @@ from onnx import TensorProto, helper, numpy_helper
 
 from vm_embedded.network.model_file import sealed
 
-_OPSETS = {"": 17, "ai.onnx.ml": 3}
+_OPSET = 17
 _IR_VERSION = 8
 """ONNX Runtime reads this version since 1.12: a robot may have an older one than the workstation."""
 
-FLOAT, UINT8, INT32, INT64 = TensorProto.FLOAT, TensorProto.UINT8, TensorProto.INT32, TensorProto.INT64
-BOOL = TensorProto.BOOL
+FLOAT, UINT8, INT32, BOOL = TensorProto.FLOAT, TensorProto.UINT8, TensorProto.INT32, TensorProto.BOOL
 
 Tensors = dict[str, tuple[int, list[int | str]]]
 """Inputs or outputs of a model by name: element type and shape; a text in a shape names a free dimension."""
@@ -38,17 +37,10 @@ class OnnxGraph:
         self._constants[name] = numpy_helper.from_array(np.ascontiguousarray(array), name)
         return name
 
-    def node(self, operator: str, inputs: list[str], output: str, domain: str = "", **attributes: Any) -> str:
+    def node(self, operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
         """Add a node; return the name of its output."""
-        self._nodes.append(helper.make_node(operator, inputs, [output], name=output, domain=domain, **attributes))
+        self._nodes.append(helper.make_node(operator, inputs, [output], name=output, **attributes))
         return output
-
-    def columns_of(self, table: str, columns: str, output: str) -> str:
-        """Add a look-up of columns (k,) in a table (rows, m); return the name of the result (rows, k).
-
-        ArrayFeatureExtractor is the fastest operator for that: one list of columns serves all rows.
-        """
-        return self.node("ArrayFeatureExtractor", [table, columns], output, domain="ai.onnx.ml")
 
     def model(self, inputs: Tensors, outputs: Tensors, metadata: dict[str, str], doc: str) -> bytes:
         """The bytes of a model file with this graph, sealed if it has metadata. The same graph gives the same bytes."""
@@ -56,10 +48,9 @@ class OnnxGraph:
             [helper.make_tensor_value_info(name, kind, shape) for name, (kind, shape) in each.items()]
             for each in (inputs, outputs)
         )
-        domains = sorted({node.domain for node in self._nodes})
         model = helper.make_model(
             helper.make_graph(self._nodes, "visual_mesh", takes, gives, list(self._constants.values())),
-            opset_imports=[helper.make_opsetid(domain, _OPSETS[domain]) for domain in domains],
+            opset_imports=[helper.make_opsetid("", _OPSET)],
             ir_version=_IR_VERSION,
             producer_name="vm-export",
             doc_string=doc,

@@ -1,4 +1,4 @@
-"""The graph of layout `plain`, for any ONNX runtime: points as rows, one Gather and one matrix product per layer."""
+"""The ONNX graph of a network on a graph: points as rows, one Gather and one matrix product per layer."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _OPERATORS = {"selu": "Selu", "relu": "Relu", "elu": "Elu", "tanh": "Tanh", "sof
 
 
 def plain_model(network: Network, manifest: Manifest) -> bytes:
-    """The bytes of an ONNX model in the layout `plain`.
+    """The bytes of an ONNX model.
 
     Inputs: points (n + 1, 3) float32 and neighbors (n + 1, N) int32, where row n is the off-screen point. Output:
     probabilities (n + 1, C) float32.

@@ -11,9 +11,9 @@ import torch
 
 from vm_embedded.arrays import Indices, Singles
 from vm_embedded.mesh.mesh import Mesh
+from vm_embedded.network.example import SelfTest
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
-from vm_embedded.network.self_test import SelfTest
 
 from .canvas_network import CanvasNetwork
 from .mesh_networks import MeshNetwork, model_outputs
@@ -58,7 +58,7 @@ def _patch(manifest: Manifest) -> Mesh:
     mesh = manifest.model.build(manifest.mesh_shape, height, manifest.intersections, reach)
     kept = np.array([len(mesh) // 2])
     for _ in range(_HOPS):
-        kept = np.unique([*kept, *mesh.links(kept).ravel()])
+        kept = np.unique([*kept, *mesh.neighbors[kept].ravel()])
         kept = kept[kept < len(mesh)]
     return mesh.part(kept)
 

@@ -19,8 +19,8 @@ from vm_workstation.stopping import stoppable
 
 from .answers import AnswerFile, read_answers
 from .box_folder import BoxFolder, read_box_folder, with_drawn
+from .labeling import Labeling
 from .server import LabelServer
-from .session import Session
 from .training_boxes import Written, write_training_boxes
 
 
@@ -136,7 +136,7 @@ def _serve(options: argparse.Namespace, folder: BoxFolder) -> None:
         )
     with AnswerFile(folder.path) as file:
         folder, answers = _judged(folder, options)
-        session = Session(folder, answers, file)
+        session = Labeling(folder, answers, file)
         with LabelServer(session, options.host, options.port) as server:
             without = len(folder.images) - len({crop.image for crop in folder.crops})
             print(

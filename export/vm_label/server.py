@@ -23,7 +23,7 @@ from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.live.http_server import is_numeric_host
 
 from .answers import ANSWERS
-from .session import Session
+from .labeling import Labeling
 
 _PAGE = Path(__file__).with_name("page.html")
 
@@ -36,7 +36,7 @@ class LabelServer(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, session: Session, host: str, port: int) -> None:
+    def __init__(self, session: Labeling, host: str, port: int) -> None:
         self.session = session
         self._host = host
         self.page = _PAGE.read_bytes()

@@ -28,7 +28,7 @@ def engine(tmp_path, answer):
 
 
 def test_both_are_timed_on_the_same_pictures(tmp_path):
-    done = compare(engine(tmp_path, 4000.0), "--rounds", "1", "--model", "ball-small")
+    done = compare(engine(tmp_path, 4000.0), "--rounds", "1", "--model", "ball")
     assert done.returncode == 0, done.stderr
     rows = [line.split("|") for line in done.stdout.splitlines()[2:4]]
     assert [float(each[2]) for each in rows][1] == 4000.0

@@ -91,7 +91,7 @@ def test_a_configuration_brings_its_model_and_its_lens(tmp_path):
     need_wheels()
     lens = '[lens]\nprojection = "equisolid"\nfocal_length = 420.0\nfov = 3.14\n'
     (tmp_path / "left.toml").write_text(lens)
-    text = '# ours\nmodel = "ball-small"\nlens = "left.toml" # of the left eye\n\n[camera]\nsource = "0"\n'
+    text = '# ours\nmodel = "ball"\nlens = "left.toml" # of the left eye\n\n[camera]\nsource = "0"\n'
     (tmp_path / "robot.toml").write_text(text)
     ran = bundle_command("--dist", tmp_path / "dist", "--config", tmp_path / "robot.toml")
     assert (ran.returncode, ran.stderr) == (0, "")
@@ -102,7 +102,7 @@ def test_a_configuration_brings_its_model_and_its_lens(tmp_path):
     assert (etc / "vm.toml").read_text().startswith("# ours\n")
     assert (etc / "left.toml").read_text() == lens
     package = CHECKOUT / "vm_embedded" / "models"
-    assert (etc / "model.onnx").read_bytes() == (package / "ball-small.onnx").read_bytes()
+    assert (etc / "model.onnx").read_bytes() == (package / "ball.onnx").read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_a_configuration_brings_its_model_and_its_lens(tmp_path):
     [
         (["--target", "windows"], ["TARGET", "linux_x86_64-cp311", "'windows'"]),
         (["--target", "linux_x86_64-cp39"], ["TARGET", "Python 3.11 or newer"]),
-        (["--model", "ball-smaller"], ["'ball-smaller'", "did you mean 'ball-small'"]),
+        (["--model", "socker"], ["'socker'", "did you mean 'soccer'"]),
         (["--model", "missing.onnx"], ["missing.onnx"]),
         (["--config", "missing.toml"], ["missing.toml"]),
     ],

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.messages import read_message
+from tests.other_model import OTHER
 
 from .bundles import CHECKOUT, changed
 from .prefixes import Prefix
@@ -22,7 +23,7 @@ SEED = 29
 KILLS = {"install": 20, "upgrade": 60, "model": 60, "rollback": 60}
 """Numbers of kills before the command has ended by itself."""
 
-MODELS = [CHECKOUT / "vm_embedded" / "models" / f"{name}.onnx" for name in ("ball", "ball-small")]
+MODELS = [CHECKOUT / "vm_embedded" / "models" / "ball.onnx", OTHER]
 
 
 class Killed:

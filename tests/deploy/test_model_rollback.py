@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from tests.other_model import OTHER
+
 from .bundles import CHECKOUT
 from .prefixes import Prefix
 
 pytestmark = pytest.mark.long
 
-MODELS = {name: CHECKOUT / "vm_embedded" / "models" / f"{name}.onnx" for name in ("ball", "ball-small", "soccer")}
+MODELS = {name: CHECKOUT / "vm_embedded" / "models" / f"{name}.onnx" for name in ("ball", "soccer")} | {"other": OTHER}
 
 
 class Light(Prefix):
@@ -46,14 +48,14 @@ def prefix(tmp_path):
 
 
 def test_a_model_is_taken_back_before_a_release(prefix):
-    changed = prefix.deploy("model", MODELS["ball-small"])
-    assert (changed.returncode, prefix.model, prefix.link("current")) == (0, "ball-small", "2-second"), changed.stderr
+    changed = prefix.deploy("model", MODELS["other"])
+    assert (changed.returncode, prefix.model, prefix.link("current")) == (0, "other", "2-second"), changed.stderr
     assert "note:" not in changed.stdout
-    for model in ("ball", "ball-small"):
+    for model in ("ball", "other"):
         back = prefix.deploy("rollback")
         assert (back.returncode, prefix.model, prefix.link("current")) == (0, model, "2-second"), back.stderr
     assert prefix.deploy("rollback", "2-second").returncode == 2
-    for release, model in (("1-first", "ball"), ("2-second", "ball-small")):  # the second one undoes the first
+    for release, model in (("1-first", "ball"), ("2-second", "other")):  # the second one undoes the first
         back = prefix.deploy("rollback", *(["release"] if release == "1-first" else []))
         assert (back.returncode, prefix.model, prefix.link("current")) == (0, model, release), back.stderr
 

@@ -13,6 +13,7 @@ import time
 import pytest
 
 from tests.messages import read_message
+from tests.other_model import OTHER
 
 from .bundles import CHECKOUT, changed
 from .robots import booted
@@ -298,8 +299,8 @@ def _model_command(team, model, signature=None):
 def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     team.check("1-first")
     before = team.status()
-    network = CHECKOUT / "vm_embedded" / "models"
-    status, said = _model_command(team, (network / "ball-small.onnx").read_bytes())
+    ball = CHECKOUT / "vm_embedded" / "models" / "ball.onnx"
+    status, said = _model_command(team, OTHER.read_bytes())
     assert status == 0, said
     now = team.status()
     assert now["model_sha256"] != before["model_sha256"]
@@ -307,7 +308,7 @@ def test_a_model_alone_is_exchanged_while_it_runs(team, bundle):
     status, said = _model_command(team, b"no network")
     assert status == 1
     assert "nothing has changed" in said
-    team.robot.root.joinpath("var/tmp/new.onnx").write_bytes((network / "ball.onnx").read_bytes())
+    team.robot.root.joinpath("var/tmp/new.onnx").write_bytes(ball.read_bytes())
     exchanged = f"while ! [ -e {CURRENT}/etc/.old.onnx ]; do sleep 0.01; done"
     interrupted = f"{DEPLOY} model /var/tmp/new.onnx & {exchanged}; kill -TERM $!; wait $!"
     assert "rolling back to the old model" in team.robot.run("sh", "-c", interrupted, check=False)[1]
@@ -320,7 +321,7 @@ def test_killed_at_random_moments_of_a_change_a_detector_works(team, kind):
     """Also under systemd; test_kills.py does it more often without."""
     chance = random.Random(kind)
     for number in range(6):
-        model = CHECKOUT / "vm_embedded" / "models" / ("ball.onnx", "ball-small.onnx")[number % 2]
+        model = (CHECKOUT / "vm_embedded" / "models" / "ball.onnx", OTHER)[number % 2]
         shutil.copy(model, team.robot.root / "var/tmp/new.onnx")
         words = [DEPLOY, kind, *(["/var/tmp/new.onnx"] if kind == "model" else [])]
         with team.robot.start("setsid", "sh", "-c", 'echo $$; exec "$@"', "sh", *words) as process:

@@ -8,6 +8,8 @@ import subprocess
 
 import pytest
 
+from tests.other_model import OTHER
+
 from .bundles import CHECKOUT, bundle_command, changed, list_again, packed, signed, unpacked
 from .prefixes import Prefix
 
@@ -258,7 +260,7 @@ def test_attack_11_an_older_bundle_needs_the_option(prefix, small, tmp_path):
 
 def test_attack_11_with_a_key_only_signed_models_that_are_not_older_are_accepted(prefix, keys):
     model, used = keys / "new.onnx", prefix.path / "current" / "etc" / "model.onnx"
-    first, second = used.read_bytes(), (CHECKOUT / "vm_embedded" / "models" / "ball-small.onnx").read_bytes()
+    first, second = used.read_bytes(), OTHER.read_bytes()
 
     def ask(content, key, namespace, *options):
         model.write_bytes(content)

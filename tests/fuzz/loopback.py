@@ -37,7 +37,7 @@ def opened_daemon() -> tuple[Daemon, int]:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     configuration = Configuration(
-        model=str(model_path("ball-small")),
+        model=str(model_path("ball")),
         camera=CameraSettings(source="synthetic", max_age_ms=10000.0),  # a busy machine may be slow
         output=OutputSettings(stdout=False),
         status=StatusSettings(socket=str(CONTROL), page=f"127.0.0.1:{port}"),

@@ -21,7 +21,7 @@ import torch
 
 from tests.named_models import GOOD
 from tests.vm_embedded.live.running import DEMO
-from tests.vm_export.checkpoints import checkpoint, manifest
+from tests.vm_export.checkpoints import checkpoint, peak_checkpoint
 from tests.vm_export.looks import look_checkpoint
 from tests.vm_train.boxes.written import coco_table, voc_text
 from vm_embedded.config.toml_writer import to_commented_toml
@@ -258,10 +258,9 @@ def _models() -> dict[str, bytes]:
     made = {}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.onnx"
-        for layout in ("plain", "runs"):
-            export(_small(), path, layout)
-            made[layout] = path.read_bytes()
-        export(Checkpoint(_small().network, manifest()), path, "plain", [look_checkpoint()])
+        export(_small(), path)
+        made["graph"] = path.read_bytes()
+        export(peak_checkpoint(), path, [look_checkpoint()])
         made["look"] = path.read_bytes()
     return made
 

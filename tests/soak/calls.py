@@ -18,7 +18,7 @@ from vm_embedded.cameras.synthetic import SyntheticCamera
 
 from .detectors import resident_memory
 
-MODEL = "ball-small"
+MODEL = "ball"
 _SETTLED = 0.05
 """Part of the calls after which memory must be flat."""
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from tests.vm_embedded.strategies import seeds
 from vm_calibrate.board_poses import first_pose
 from vm_calibrate.boards import Corners
-from vm_calibrate.frames import Search, Sighting, choose
+from vm_calibrate.frames import BoardSighting, Search, choose
 from vm_calibrate.lens_fit import fit_lens
 from vm_embedded.errors import InputError
 
@@ -34,7 +34,7 @@ def sightings(kind, count, noise, seed):
         ray = camera.lens.unproject(random.uniform((90, 90), (550, 390), (1, 2)), SIZE)[0]
         pixels = seen(camera.lens, *camera.facing(ray), random, noise)
         if (pixels > 0).all() and (pixels < SIZE).all():
-            made.append(Sighting(f"frame {len(made)}", Corners(PLACES, pixels), 2.5))
+            made.append(BoardSighting(f"frame {len(made)}", Corners(PLACES, pixels), 2.5))
     return made
 
 
@@ -57,7 +57,7 @@ def test_the_true_lens_is_within_the_stated_uncertainty(kind, seed):
 def test_frames_that_disagree_are_left_out(seed):
     frames = sightings("rectilinear", 12, 0.1, seed)
     wrong = frames[3].corners.pixels + np.random.default_rng(seed).normal(0.0, 3.0, (len(PLACES), 2))
-    frames[3] = Sighting("moved", Corners(PLACES, wrong), 2.5)
+    frames[3] = BoardSighting("moved", Corners(PLACES, wrong), 2.5)
     fit = fit_lens("rectilinear", frames, SIZE)
     assert [sighting.name for sighting, _ in fit.outliers] == ["moved"]
     assert fit.lens.scale == pytest.approx(LENSES["rectilinear"].scale, rel=0.005)
@@ -108,8 +108,8 @@ def test_too_few_frames_are_an_error():
 
 def test_chosen_frames_are_sharp_and_different():
     frames = sightings("rectilinear", 10, 0.1, 2)
-    again = [Sighting(f"again {each.name}", each.corners, 2.6) for each in frames]
-    blurred = [Sighting(f"blurred {each.name}", each.corners, 9.0) for each in frames[:4]]
+    again = [BoardSighting(f"again {each.name}", each.corners, 2.6) for each in frames]
+    blurred = [BoardSighting(f"blurred {each.name}", each.corners, 9.0) for each in frames[:4]]
     search = Search(SIZE, [*frames, *again, *blurred])
     chosen = choose(search, 10)
     assert len({id(each.corners) for each in chosen}) == 10

@@ -37,5 +37,13 @@ def canvas_checkpoint(seed, shape):
     names = [f"class{i}" for i in range(shape.classes)]
     peaks = names[: shape.peaks]
     kinds = [f"{each}:object" if each in peaks else each for each in names]
-    facts = manifest(kinds, "octaves", layout="canvas", peaks=tuple(peaks))
+    facts = manifest(kinds, "octaves", peaks=tuple(peaks))
     return Checkpoint(network.eval(), facts)
+
+
+def peak_checkpoint(seed=0, classes=("ball", "environment")):
+    """A checkpoint whose network has peaks for its objects and uprights."""
+    kinds = [each.partition(":")[::2] for each in classes]
+    peaks = tuple(name for name, kind in kinds if name == "ball" or kind == "upright")
+    network = canvas_checkpoint(seed, CanvasShape(1, 8, len(classes), len(peaks))).network
+    return Checkpoint(network, manifest(classes, "octaves", peaks=peaks))

@@ -1,7 +1,5 @@
 """Seeded look networks, their checkpoints and their answers in torch."""
 
-from dataclasses import replace
-
 import torch
 
 from tests.looks import look_contract, random_patches
@@ -27,13 +25,6 @@ def look_checkpoint(seed=0, shape=SHAPE, **changes):
     """A checkpoint with three examples; changes: other entries of its contract."""
     contract = look_contract(**{"size": shape.size, "channels": shape.channels} | changes)
     return LookCheckpoint(look_network(seed, shape), contract, random_patches(3, shape.size, seed))
-
-
-def glancing_checkpoint(seed=0, **changes):
-    """A checkpoint with a glance of other weights and of 9 x 9 samples; changes: other entries of both contracts."""
-    glance = look_checkpoint(seed + 1, LookShape(size=9, channels=(4, 5, 6)), **changes)
-    look = look_checkpoint(seed, **changes)
-    return replace(look, contract=replace(look.contract, glance=glance.contract), glance=glance)
 
 
 def torch_answers(network, patches):

@@ -1,6 +1,4 @@
-"""Looks in model files: beside the mesh network, with their glances and tests, one for each class."""
-
-from dataclasses import replace
+"""Looks in model files: beside the mesh network, with their tests, one for each class."""
 
 import numpy as np
 import onnx
@@ -8,27 +6,20 @@ import pytest
 import torch
 
 from tests.looks import random_patches
-from tests.vm_export.checkpoints import checkpoint, manifest
-from tests.vm_export.looks import glancing_checkpoint, look_checkpoint, look_network, torch_answers
+from tests.vm_export.checkpoints import peak_checkpoint
+from tests.vm_export.looks import look_checkpoint, look_network, torch_answers
 from vm_embedded.errors import ModelError
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.manifest import ObjectClass
+from vm_embedded.network.look_contract import look_key
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.session import Session
 from vm_export import attach_look, export
 from vm_export.change_model import change_looks
-from vm_export.checkpoint import Checkpoint
 from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_graph import look_model
-from vm_export.look_network import LookShape
-from vm_export.look_weights import look_of, upright_looks_of
+from vm_export.look_weights import looks_of
 from vm_export.metadata import with_metadata
-from vm_export.network_shape import NetworkShape
-
-
-def ball_checkpoint(seed=0):
-    return Checkpoint(checkpoint(seed).network, manifest())
 
 
 def check_self_test(test, look):
@@ -53,32 +44,23 @@ def test_a_network_that_is_sure_of_all_patches_is_also_tested_with_a_mixture():
     assert ((mixture >= ends.min(axis=0)) & (mixture <= ends.max(axis=0))).all()
 
 
-def test_a_calibration_changes_all_networks_whose_logits_count():
-    """Those of a wide look are a part of a mean with those of its glance."""
-    two = glancing_checkpoint()
-    three = look_checkpoint(7)
-    three = replace(three, contract=replace(three.contract, glance=two.contract), glance=two)
-    for look, count in ((two, 1), (three, 2)):
-        after = look.recalibrated(3.0, 1.0, "a test")
-        for number in range(len(look.contract.chain)):
-            scale, offset = look.network.calibration.tolist()
-            expected = (3.0 * scale, 3.0 * offset + 1.0) if number < count else (scale, offset)
-            assert after.network.calibration.tolist() == pytest.approx(expected)
-            assert ("calibrated_on" in after.contract.provenance) == (number < count)
-            look, after = look.glance, after.glance
+def test_a_calibration_changes_the_last_scale_and_offset_and_how_much_the_score_counts():
+    look = look_checkpoint(mesh_weight=0.5)
+    after = look.recalibrated(3.0, 1.0, "a test")
+    scale, offset = look.network.calibration.tolist()
+    assert after.network.calibration.tolist() == pytest.approx((3.0 * scale, 3.0 * offset + 1.0))
+    assert (after.contract.mesh_weight, after.contract.provenance["calibrated_on"]) == (1.5, "a test")
 
 
-@pytest.mark.parametrize("layout", ["plain", "runs"])
-def test_a_model_file_holds_both_networks(tmp_path, layout):
-    mesh, look = ball_checkpoint(), look_checkpoint(provenance={"trained_by": "a test"})
-    assert export.export(mesh, tmp_path / "model.onnx", layout, [look]) < 1e-4
+def test_a_model_file_holds_both_networks(tmp_path):
+    mesh, look = peak_checkpoint(), look_checkpoint(provenance={"trained_by": "a test"})
+    assert export.export(mesh, tmp_path / "model.onnx", [look]) < 1e-4
     read = read_model(tmp_path / "model.onnx")
     onnx.checker.check_model(onnx.load(tmp_path / "model.onnx"), full_check=True)
     example = export.random_example(mesh.network, 50, 1)
     np.testing.assert_allclose(Session(read).answer(example), example.probabilities[:-1], atol=1e-5)
 
-    close = CloseLook.of(read)
-    assert close.glance is None
+    close = CloseLook.of(read)["ball"]
     assert close.contract.provenance["trained_by"] == "a test"
     assert close.contract.provenance["exported_by"].startswith("vm-export")
     check_self_test(close.contract.self_test, look)
@@ -87,8 +69,8 @@ def test_a_model_file_holds_both_networks(tmp_path, layout):
 
 
 def test_a_look_changes_nothing_but_the_metadata(tmp_path):
-    export.export(ball_checkpoint(), tmp_path / "without.onnx")
-    export.export(ball_checkpoint(), tmp_path / "with.onnx", looks=[look_checkpoint()])
+    export.export(peak_checkpoint(), tmp_path / "without.onnx")
+    export.export(peak_checkpoint(), tmp_path / "with.onnx", looks=[look_checkpoint()])
     assert change_looks(tmp_path / "without.onnx", tmp_path / "attached.onnx", [look_checkpoint()]).difference < 1e-4
     assert (tmp_path / "attached.onnx").read_bytes() == (tmp_path / "with.onnx").read_bytes()
     assert change_looks(tmp_path / "with.onnx", tmp_path / "removed.onnx", []).difference == 0.0
@@ -98,95 +80,73 @@ def test_a_look_changes_nothing_but_the_metadata(tmp_path):
 
 
 def test_a_look_replaces_the_one_before(tmp_path):
-    export.export(ball_checkpoint(), tmp_path / "model.onnx", looks=[look_checkpoint(1)])
+    export.export(peak_checkpoint(), tmp_path / "model.onnx", looks=[look_checkpoint(1)])
     change_looks(tmp_path / "model.onnx", tmp_path / "other.onnx", [look_checkpoint(2)])
-    export.export(ball_checkpoint(), tmp_path / "expected.onnx", looks=[look_checkpoint(2)])
+    export.export(peak_checkpoint(), tmp_path / "expected.onnx", looks=[look_checkpoint(2)])
     assert (tmp_path / "other.onnx").read_bytes() == (tmp_path / "expected.onnx").read_bytes()
 
 
-def test_a_model_file_holds_the_glance_too(tmp_path):
-    look = glancing_checkpoint()
-    export.export(ball_checkpoint(), tmp_path / "model.onnx", looks=[look])
-    close = CloseLook.of(read_model(tmp_path / "model.onnx"))
-    for loaded, made, size in ((close, look, 8), (close.glance, look.glance, 9)):
-        patches = random_patches(7, size, seed=4)
-        np.testing.assert_allclose(loaded.run(patches), torch_answers(made.network, patches), atol=1e-5)
-        check_self_test(loaded.contract.self_test, made)
-        assert loaded.contract.provenance["exported_by"].startswith("vm-export")
-    export.export(ball_checkpoint(), tmp_path / "without.onnx")
-    change_looks(tmp_path / "model.onnx", tmp_path / "removed.onnx", [])
-    assert (tmp_path / "removed.onnx").read_bytes() == (tmp_path / "without.onnx").read_bytes()
-
-
-def test_a_glance_that_differs_from_torch_is_not_written(tmp_path, monkeypatch):
-    other, right = look_model(look_network(5, LookShape(9, (4, 5, 6)))), look_model
-    monkeypatch.setattr(attach_look, "look_model", lambda network: other if network.shape.size == 9 else right(network))
-    with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
-        export.export(ball_checkpoint(), tmp_path / "new.onnx", looks=[glancing_checkpoint()])
-
-
-def test_a_checkpoint_keeps_its_glance(tmp_path):
-    look = glancing_checkpoint()
+def test_a_look_comes_back_from_a_checkpoint_and_from_a_model_file(tmp_path):
+    look = look_checkpoint()
     look.save(tmp_path / "look.pt")
     read = LookCheckpoint.load(tmp_path / "look.pt")
     assert read.contract == look.contract
-    for found, expected in ((read, look), (read.glance, look.glance)):
-        np.testing.assert_array_equal(found.examples, expected.examples)
-        for name, value in expected.network.state_dict().items():
-            assert torch.equal(found.network.state_dict()[name], value), name
-    with pytest.raises(ModelError, match=r"glance .* is not the one in its contract"):
-        replace(look, glance=None)
+    np.testing.assert_array_equal(read.examples, look.examples)
+    for name, value in look.network.state_dict().items():
+        assert torch.equal(read.network.state_dict()[name], value), name
+    round_kernels(look.network)
+    export.export(peak_checkpoint(), tmp_path / "model.onnx", looks=[look])
+    (again,) = looks_of(read_model(tmp_path / "model.onnx"))
+    patches = random_patches(5)
+    np.testing.assert_allclose(torch_answers(again.network, patches), torch_answers(look.network, patches), atol=1e-5)
 
 
 def test_other_metadata_of_a_model_file_stays(tmp_path):
-    export.export(ball_checkpoint(), tmp_path / "model.onnx")
+    export.export(peak_checkpoint(), tmp_path / "model.onnx")
     model = onnx.load(tmp_path / "model.onnx")
     assert model.metadata_props.pop().key == SEAL_KEY
     model.metadata_props.add(key="author", value="Zoë")
     (tmp_path / "model.onnx").write_bytes(sealed(model.SerializeToString()))
     change_looks(tmp_path / "model.onnx", tmp_path / "other.onnx", [look_checkpoint()])
     kept = {each.key: each.value for each in onnx.load(tmp_path / "other.onnx").metadata_props}
-    assert sorted(kept) == ["author", "visual_mesh", "visual_mesh_look", "visual_mesh_sha256"]
+    assert sorted(kept) == ["author", "visual_mesh", "visual_mesh_look_ball", "visual_mesh_sha256"]
     assert kept["author"] == "Zoë"
 
 
 def test_a_look_that_differs_from_torch_is_not_written(tmp_path, monkeypatch):
     other = look_model(look_network(5))
     monkeypatch.setattr(attach_look, "look_model", lambda network: other)
-    export.export(ball_checkpoint(), tmp_path / "model.onnx")
+    export.export(peak_checkpoint(), tmp_path / "model.onnx")
     with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
-        export.export(ball_checkpoint(), tmp_path / "new.onnx", looks=[look_checkpoint()])
+        export.export(peak_checkpoint(), tmp_path / "new.onnx", looks=[look_checkpoint()])
     with pytest.raises(ModelError, match=r"answers of the close look .* differ by"):
         change_looks(tmp_path / "model.onnx", tmp_path / "new.onnx", [look_checkpoint()])
     assert [path.name for path in tmp_path.iterdir()] == ["model.onnx"]
 
 
 def test_networks_whose_answers_are_not_numbers_are_not_written(tmp_path):
-    look, mesh = look_checkpoint(), ball_checkpoint()
+    look, mesh = look_checkpoint(), peak_checkpoint()
     with torch.no_grad():
         look.network.answers.bias[2] = torch.nan
-        mesh.network.typed_layers[0].linear.bias[0] = torch.nan
+        mesh.network.head.bias[0] = torch.nan
     with pytest.raises(ModelError, match="close look: its answers are NaN or infinite"):
-        export.export(ball_checkpoint(), tmp_path / "model.onnx", looks=[look])
+        export.export(peak_checkpoint(), tmp_path / "model.onnx", looks=[look])
     with pytest.raises(ModelError, match="the new model: its answers are NaN or infinite"):
         export.export(mesh, tmp_path / "model.onnx")
     assert not list(tmp_path.iterdir())
 
 
-def test_a_look_for_a_class_that_is_no_object_is_not_written(tmp_path):
+def test_a_look_for_a_class_without_peaks_is_not_written(tmp_path):
     for name in ("goal", "environment"):
-        with pytest.raises(ModelError, match=rf"'{name}'.* kind object are \['ball'\]"):
-            export.export(ball_checkpoint(), tmp_path / "model.onnx", looks=[look_checkpoint(object_class=name)])
+        with pytest.raises(ModelError, match=rf"looks at \['{name}'\].* peaks for \['ball'\]"):
+            export.export(peak_checkpoint(), tmp_path / "model.onnx", looks=[look_checkpoint(object_class=name)])
     assert not list(tmp_path.iterdir())
 
 
 def test_there_must_be_a_look_to_remove(tmp_path):
-    export.export(ball_checkpoint(), tmp_path / "model.onnx")
+    export.export(peak_checkpoint(), tmp_path / "model.onnx")
     with pytest.raises(ModelError, match=r"model\.onnx has no close look to remove"):
         change_looks(tmp_path / "model.onnx", tmp_path / "other.onnx", [])
-
-
-CLASSES = (ObjectClass("ball", "object"), ObjectClass("goal", "upright"), ObjectClass("robot", "upright"))
 
 
 def upright(name, seed=0):
@@ -197,8 +157,7 @@ def upright(name, seed=0):
 def field(tmp_path):
     """A model file of a network with goals and robots."""
     path = tmp_path / "field.onnx"
-    network = checkpoint(shape=NetworkShape.uniform(3, 4, 3)).network
-    export.export(Checkpoint(network, replace(manifest(), classes=CLASSES)), path)
+    export.export(peak_checkpoint(classes=("ball", "goal:upright", "robot:upright")), path)
     return path
 
 
@@ -211,56 +170,21 @@ def attach(path, *looks):
 def test_a_model_file_holds_a_look_for_each_upright_beside_that_of_the_object(field):
     ball, goal, robot = look_checkpoint(), upright("goal", 1), upright("robot", 2)
     read = attach(field, goal, ball, robot)
-    looks = CloseLook.of_uprights(read)
-    assert list(looks) == ["goal", "robot"]
+    looks = CloseLook.of(read)
+    assert list(looks) == ["goal", "ball", "robot"]
     patches = random_patches(9, seed=5)
-    for close, made in ((CloseLook.of(read), ball), (looks["goal"], goal), (looks["robot"], robot)):
+    for close, made in ((looks["ball"], ball), (looks["goal"], goal), (looks["robot"], robot)):
         np.testing.assert_allclose(close.run(patches), torch_answers(made.network, patches), atol=1e-5)
         check_self_test(close.contract.self_test, made)
         assert close.contract.upright_radius == made.contract.upright_radius
 
 
-def test_a_look_at_an_upright_brings_its_glance(field):
-    looks = [glancing_checkpoint(), glancing_checkpoint(4, object_class="goal", upright_radius=0.3)]
-    read = attach(field, *looks)
-    loaded = [CloseLook.of(read), CloseLook.of_uprights(read)["goal"]]
-    for close, made in zip(loaded, looks, strict=True):
-        patches = random_patches(5, size=9)
-        np.testing.assert_allclose(close.glance.run(patches), torch_answers(made.glance.network, patches), atol=1e-5)
-        check_self_test(close.glance.contract.self_test, made.glance)
-    for again, made in zip([look_of(read), *upright_looks_of(read)], looks, strict=True):
-        assert again.glance.contract.keys == made.glance.contract.keys
-    without = attach(field, upright("goal"))
-    assert len(without.upright_looks[0]) == 1
-    assert without.look == read.look
-
-
-@pytest.mark.parametrize("changes", [{}, {"object_class": "goal", "upright_radius": 0.3}], ids=["object", "upright"])
-def test_a_glance_may_have_a_glance(field, changes):
-    two = glancing_checkpoint(**changes)
-    last = look_checkpoint(7, LookShape(size=10, channels=(3, 4, 5)), **changes)
-    round_kernels(last.network)  # a file may hold one network as integers and another one in full
-    made = replace(last, contract=replace(last.contract, glance=two.contract), glance=two)
-    read = attach(field, made)
-    close = CloseLook.of_uprights(read)["goal"] if changes else CloseLook.of(read)
-    again = upright_looks_of(read)[0] if changes else look_of(read)
-    for _ in range(3):
-        patches = random_patches(5, size=made.contract.size)
-        np.testing.assert_allclose(close.run(patches), torch_answers(made.network, patches), atol=1e-5)
-        np.testing.assert_allclose(torch_answers(again.network, patches), close.run(patches), atol=1e-5)
-        check_self_test(close.contract.self_test, made)
-        close, made, again = close.glance, made.glance, again.glance
-    assert (close, made, again) == (None, None, None)
-    replaced = attach(field, look_checkpoint(**changes))
-    assert [len(each) for each in (replaced.look, *replaced.upright_looks) if each is not None] == [1]
-
-
 def test_a_look_at_an_upright_replaces_the_one_before_and_no_other(field):
     first = attach(field, upright("goal", 1), upright("robot", 2))
     second = attach(field, upright("goal", 3))
-    assert first.upright_looks[1] in second.upright_looks
-    assert first.upright_looks[0] not in second.upright_looks
-    assert len(second.upright_looks) == 2
+    assert first.looks[1] in second.looks
+    assert first.looks[0] not in second.looks
+    assert len(second.looks) == 2
 
 
 def test_no_look_removes_all_of_them(field, tmp_path):
@@ -273,8 +197,8 @@ def test_no_look_removes_all_of_them(field, tmp_path):
 @pytest.mark.parametrize(
     ("look", "message"),
     [
-        (look_checkpoint(object_class="goal"), r"judges class 'goal', but the classes of kind object are \['ball'\]"),
-        (upright("ball"), r"looks at the uprights \['ball'\], but the classes of kind upright are \['goal', 'robot'\]"),
+        (look_checkpoint(object_class="goal"), "upright_radius of at least 0.01 m, not 0 m"),
+        (upright("ball"), "for a class of kind object it must be 0"),
         (upright("post"), "'post'"),
     ],
 )
@@ -285,12 +209,11 @@ def test_a_look_for_another_kind_of_class_is_refused(field, tmp_path, look, mess
 
 def test_a_file_whose_looks_are_not_those_of_its_manifest_is_refused(field, tmp_path):
     read = attach(field, upright("goal"))
-    (key,), glance_key = upright("goal").contract.keys, "visual_mesh_glance_goal"
+    key = look_key("goal")
     (text,) = (each.value for each in onnx.load_from_string(read.content).metadata_props if each.key == key)
     for entries, message in (
         ({key: None}, "manifest has a close look at goal, its metadata has none"),
-        ({"visual_mesh_look_robot": text}, "metadata has a close look at robot, its manifest has none"),
-        ({glance_key: text}, "metadata has a glance at goal, its manifest has none"),
+        ({"visual_mesh_look_robot": text}, "metadata has visual_mesh_look_robot, its manifest has no such close look"),
         ({key: "?"}, "a close look at goal can't be read"),
     ):
         (tmp_path / "changed.onnx").write_bytes(with_metadata(read.content, entries))

@@ -150,13 +150,14 @@ def test_what_is_off_screen_is_as_if_it_were_not_in_the_mesh():
     mesh = manifest.model.build(manifest.mesh_shape, 0.6, 2.0, 3.0)
     layout = choose_layout(mesh, manifest)
     random = np.random.default_rng(0)
-    shown = (layout.slots < len(mesh)) & (random.random(len(layout)) < 0.7)
-    one, other = (np.where(shown, 0.3, random.random((3, len(layout)))).astype(np.float32) for _ in range(2))
-    answers = [session.run(layout, each, shown)[shown] for each in (one, other)]
+    on_screen = random.random(len(mesh)) < 0.7
+    shown = layout.spread(on_screen)
+    one, other = (np.where(shown, 0.3, random.random((3, len(shown)))).astype(np.float32) for _ in range(2))
+    answers = [session.run(layout, each, on_screen, np.flatnonzero(on_screen)) for each in (one, other)]
     np.testing.assert_array_equal(*answers)
     one[0, np.flatnonzero(shown)[0]] = np.nan
     with pytest.raises(ModelError, match="NaN or infinite"):
-        session.run(layout, one, shown)
+        session.run(layout, one, on_screen, np.flatnonzero(on_screen))
 
 
 @pytest.mark.long
@@ -166,7 +167,7 @@ def test_an_exported_network_detects_with_the_whole_mesh(tmp_path):
 
     export.export(checkpoint(2, mesh="octaves"), tmp_path / "model.onnx")
     model = read_model(tmp_path / "model.onnx")
-    assert (model.manifest.layout, model.manifest.mesh) == ("canvas", "octaves")
+    assert model.manifest.mesh == "octaves"
     assert model.manifest.operations == CanvasShape(1, 8, 2).operations
     image = frozen(np.random.default_rng(1).integers(0, 256, (SIZE[1], SIZE[0], 3), dtype=np.uint8))
     lens = Equisolid(focal_length=150.0, fov=2.4)

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -43,69 +42,18 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_command_writes_the_fastest_layout_and_the_portable_one_beside_it(tmp_path):
-    made = checkpoint()
+@pytest.mark.parametrize("mesh", ["ring6", "nmgrid8", "cap6", "octaves"])
+def test_command_writes_a_model_file(mesh, tmp_path):
+    made = checkpoint(mesh=mesh)
     made.save(tmp_path / "model.pt")
     done = run(tmp_path / "model.pt")
-    assert names_in(tmp_path) == ["model.onnx", "model.plain.onnx", "model.pt"]
-    both = [read_model(tmp_path / name) for name in ("model.onnx", "model.plain.onnx")]
-    assert [each.manifest.layout for each in both] == ["runs", "plain"]
-    assert replace(both[0].manifest, layout="plain").as_json() == both[1].manifest.as_json()
-    test = export.random_example(made.network, 300, 1)
-    for each in both:
-        answer = Session(each).answer(test)
-        np.testing.assert_allclose(answer, test.probabilities[:-1], atol=1e-5)
-        (line,) = [line for line in done.stdout.splitlines() if line.startswith(f"{each.path}:")]
-        assert f"layout {each.manifest.layout}" in line
-        assert "largest difference" in line
-
-
-@pytest.mark.long
-def test_command_names_the_portable_file_after_the_output(tmp_path):
-    checkpoint().save(tmp_path / "model.pt")
-    run(tmp_path / "model.pt", "-o", tmp_path / "ball.v2.onnx")
-    assert names_in(tmp_path) == ["ball.v2.onnx", "ball.v2.plain.onnx", "model.pt"]
-    assert read_model(tmp_path / "ball.v2.onnx").manifest.layout == "runs"
-    assert read_model(tmp_path / "ball.v2.plain.onnx").manifest.layout == "plain"
-
-
-def test_command_writes_one_file_where_the_portable_layout_is_the_fastest(tmp_path):
-    checkpoint().save(tmp_path / "model.pt")
-    run(tmp_path / "model.pt", "--edge", "same")
-    assert names_in(tmp_path) == ["model.onnx", "model.pt"]
-    assert read_model(tmp_path / "model.onnx").manifest.layout == "plain"
-
-
-@pytest.mark.parametrize(
-    ("layout", "mesh"), [("plain", "ring4"), ("runs", "ring8"), ("runs", "nmgrid8"), ("runs", "cap6")]
-)
-def test_command_writes_one_file_in_the_layout_that_it_is_told(layout, mesh, tmp_path):
-    checkpoint(mesh=mesh).save(tmp_path / "model.pt")
-    done = run(tmp_path / "model.pt", "--layout", layout)
     assert names_in(tmp_path) == ["model.onnx", "model.pt"]
     read = read_model(tmp_path / "model.onnx")
-    assert (read.manifest.layout, read.manifest.mesh) == (layout, mesh)
-    Session(read)  # runs the self-test
-    assert f"layout {layout}" in done.stdout
-
-
-def test_command_takes_a_layout_for_networks_of_the_reference(tmp_path):
-    path = reference_file(tmp_path / "model.yaml")
-    run(path, "--layout", "runs")
-    assert names_in(tmp_path) == ["model.onnx", "model.yaml"]
-    assert read_model(tmp_path / "model.onnx").manifest.layout == "runs"
-
-
-def test_command_never_writes_over_its_input(tmp_path):
-    """Not by the portable file's name either, which nobody typed."""
-    checkpoint().save(tmp_path / "model.plain.pt")
-    before = (tmp_path / "model.plain.pt").read_bytes()
-    assert (
-        "model.plain.pt is an input and would be overwritten"
-        in run(tmp_path / "model.plain.pt", "-o", tmp_path / "model.pt", code=1).stderr
-    )
-    assert (tmp_path / "model.plain.pt").read_bytes() == before
-    assert names_in(tmp_path) == ["model.plain.pt"]
+    assert read.manifest.mesh == mesh
+    test = export.random_example(made.network, 300, 1)
+    np.testing.assert_allclose(Session(read).answer(test), test.probabilities[:-1], atol=1e-5)
+    assert f"{tmp_path / 'model.onnx'}: mesh network" in done.stdout
+    assert "largest difference" in done.stdout
 
 
 @pytest.mark.long
@@ -130,7 +78,6 @@ def test_command_takes_class_names(tmp_path):
         (("model.pt", "-o", "no/such/folder/model.onnx"), "can't write"),
         (("model.pt", "--intersections", "-1"), "intersections"),
         (("model.pt", "--object-radius", "nan"), "object_radius"),
-        (("model.pt", "--layout", "runs", "--edge", "same"), "runs needs edge hard"),
     ],
 )
 def test_command_says_in_one_line_what_is_wrong(tmp_path, arguments, message):
@@ -155,20 +102,6 @@ def test_command_without_its_extra_says_what_to_install(missing, tmp_path):
 def test_edges_are_the_manifest_s():
     assert EDGES == ("hard", "same")
     assert json.loads(manifest(edge="same").as_json())["edge"] == "same"
-
-
-def test_command_refuses_a_layout_for_the_reference_s_format(tmp_path):
-    checkpoint().save(tmp_path / "model.pt")
-    assert "--layout" in run(tmp_path / "model.pt", "--to-yaml", "--layout", "plain", code=1).stderr
-    assert names_in(tmp_path) == ["model.pt"]
-
-
-@pytest.mark.long
-def test_a_portable_file_that_can_not_be_written_leaves_no_half_of_the_work(tmp_path):
-    checkpoint().save(tmp_path / "model.pt")
-    (tmp_path / "model.plain.onnx").mkdir()
-    assert "model.plain.onnx" in run(tmp_path / "model.pt", code=1).stderr
-    assert names_in(tmp_path) == ["model.plain.onnx", "model.pt"]
 
 
 @pytest.mark.parametrize(

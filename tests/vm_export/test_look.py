@@ -67,7 +67,7 @@ def test_onnx_runtime_joins_convolutions_and_activations(tmp_path, rounded):
     onnxruntime.InferenceSession(look_model(network), options)
     operators = [node.op_type for node in onnx.load(tmp_path / "optimized.onnx").graph.node]
     assert "Relu" not in operators
-    assert sum("Conv" in each for each in operators) == 4
+    assert sum("Conv" in each for each in operators) == 5
     # Those of the patch's colors; the integers of the kernels are multiplied with their steps already.
     assert (operators.count("Cast"), operators.count("Mul")) == (1, 1)
 
@@ -166,7 +166,7 @@ def test_a_shape_that_is_not_complete_is_refused(data):
 
 
 def test_a_checkpoint_is_read_back_as_it_was_written(tmp_path):
-    made = look_checkpoint(3, passes=2, provenance={"trained_by": "a test"})
+    made = look_checkpoint(3, provenance={"trained_by": "a test"})
     made.save(tmp_path / "look.pt")
     torch.load(tmp_path / "look.pt", weights_only=True)
     read = LookCheckpoint.load(tmp_path / "look.pt")
@@ -186,7 +186,7 @@ def test_a_broken_checkpoint_is_refused(tmp_path, content):
 
 def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
-    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 3'.* 'vm-embedded checkpoint"):
+    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 4'.* 'vm-embedded checkpoint"):
         LookCheckpoint.load(tmp_path / "model.pt")
     look_checkpoint().save(tmp_path / "look.pt")
     with pytest.raises(InputError, match=r"look\.pt is a close look; attach it to a network: vm-export MODEL --look"):

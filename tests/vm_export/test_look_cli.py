@@ -3,11 +3,10 @@
 import pytest
 
 from tests.looks import random_patches
-from tests.vm_export.checkpoints import checkpoint, manifest
+from tests.vm_export.checkpoints import peak_checkpoint
 from tests.vm_export.looks import look_checkpoint
 from tests.vm_export.test_cli import names_in, run
 from tests.vm_export.test_reference import reference_file
-from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
@@ -18,7 +17,7 @@ from vm_export.export import export
 @pytest.fixture
 def folder(tmp_path):
     """A folder with a checkpoint and a close look."""
-    Checkpoint(checkpoint().network, manifest()).save(tmp_path / "model.pt")
+    peak_checkpoint().save(tmp_path / "model.pt")
     look_checkpoint().save(tmp_path / "look.pt")
     return tmp_path
 
@@ -26,55 +25,29 @@ def folder(tmp_path):
 def has_look(path):
     """Whether a model file has a close look that runs and passes its self-test."""
     read = read_model(path)
-    look = CloseLook.of(read)
-    return look is not None and len(look.run(random_patches(2))) == 2
+    looks = CloseLook.of(read)
+    return "ball" in looks and len(looks["ball"].run(random_patches(2))) == 2
 
 
-def test_command_attaches_a_look_to_both_files(folder):
+def test_command_attaches_a_look(folder):
     done = run(folder / "model.pt", "--look", folder / "look.pt")
-    assert names_in(folder) == ["look.pt", "model.onnx", "model.plain.onnx", "model.pt"]
+    assert names_in(folder) == ["look.pt", "model.onnx", "model.pt"]
     assert has_look(folder / "model.onnx")
-    assert has_look(folder / "model.plain.onnx")
-    assert done.stdout.count("close look at ball (8 x 8, channels 4, 5, 6)") == 2
+    assert "close look at ball (8 x 8, channels 4, 5, 6)" in done.stdout
     assert "largest difference" in done.stdout
 
 
-def test_command_attaches_a_look_in_the_layout_that_it_is_told(folder):
-    run(folder / "model.pt", "--look", folder / "look.pt", "--layout", "plain", "-o", folder / "out.onnx")
-    assert names_in(folder) == ["look.pt", "model.pt", "out.onnx"]
-    assert has_look(folder / "out.onnx")
-
-
-def test_command_attaches_a_look_to_a_network_of_the_reference(folder):
+def test_command_attaches_no_look_to_a_network_without_peaks(folder):
     reference_file(folder / "model.yaml")
-    run(folder / "model.yaml", "--look", folder / "look.pt", "--classes", "ball:object,field:area")
-    assert has_look(folder / "model.onnx")
+    options = ("--look", folder / "look.pt", "--classes", "ball:object,field:area")
+    assert "the network has peaks for []" in run(folder / "model.yaml", *options, code=1).stderr
 
 
-@pytest.mark.long
-def test_command_takes_the_looks_of_a_network_of_the_package(folder):
-    reference_file(folder / "model.yaml")
-    done = run(folder / "model.yaml", "--look", "soccer", "--classes", "ball:object,goal:upright")
-    assert [each.object_class for each in read_model(folder / "model.onnx").manifest.looks] == ["ball", "goal"]
-    for name in ("wide look at ball", "close look at ball", "glance at goal"):
-        assert done.stdout.count(name) == 2
-    run(folder / "model.onnx", "--look", "ball-small", "-o", folder / "small.onnx")
-    (ball, goal), small = (read_model(folder / each).manifest.looks for each in ("small.onnx", "model.onnx"))
-    assert ball.names == read_model(model_path("ball-small")).manifest.look.names
-    assert goal.channels == small[1].channels
-
-
-def test_command_changes_the_probability_from_which_points_count(folder):
-    run(folder / "model.pt", "--look", folder / "look.pt", "--look-above", "0.125", "-o", folder / "out.onnx")
-    look = CloseLook.of(read_model(folder / "out.onnx"))
-    assert look.contract.above == 0.125
-    assert has_look(folder / "out.onnx")
-
-
-@pytest.mark.parametrize("options", [("--look-above", "0.1"), ("--look", "look.pt", "--look-above", "1.5")])
-def test_a_probability_without_a_look_or_out_of_range_is_refused(folder, options):
-    given = [folder / each if each == "look.pt" else each for each in options]
-    assert "--look-above" in run(folder / "model.pt", *given, code=1).stderr
+def test_command_takes_the_looks_of_another_model_file(folder):
+    run(folder / "model.pt", "--look", folder / "look.pt")
+    done = run(folder / "model.pt", "--look", folder / "model.onnx", "-o", folder / "other.onnx")
+    assert "close look at ball" in done.stdout
+    assert has_look(folder / "other.onnx")
 
 
 @pytest.mark.long
@@ -87,12 +60,7 @@ def test_command_attaches_a_look_to_a_model_file_and_removes_it(folder):
     run(folder / "new.onnx", "--no-look", "-o", folder / "old.onnx")
     assert not has_look(folder / "old.onnx")
     assert (folder / "old.onnx").read_bytes() == (folder / "model.onnx").read_bytes() == before
-    assert names_in(folder) == ["look.pt", "model.onnx", "model.plain.onnx", "model.pt", "new.onnx", "old.onnx"]
-
-
-def test_command_attaches_a_look_to_a_network_of_the_package(folder):
-    run("ball-small", "--look", folder / "look.pt", "-o", folder / "out.onnx")
-    assert has_look(folder / "out.onnx")
+    assert names_in(folder) == ["look.pt", "model.onnx", "model.pt", "new.onnx", "old.onnx"]
 
 
 @pytest.mark.parametrize(
@@ -104,12 +72,11 @@ def test_command_attaches_a_look_to_a_network_of_the_package(folder):
         (("model.pt", "--look", "look.pt", "--to-yaml"), "--look is for ONNX files"),
         (("model.pt", "--look", "look.pt", "-o", "look.pt"), "would be overwritten"),
         (("model.pt", "--no-look"), "--no-look is for model files (.onnx)"),
-        (("model.pt", "--look", "look.pt", "--classes", "goal:object,other:background"), "kind object are ['goal']"),
+        (("model.pt", "--look", "look.pt", "--classes", "goal:object,other:background"), "peaks 'ball'"),
         (("given.onnx",), "is a model file already"),
         (("damaged.onnx",), "damaged.onnx: not an ONNX file"),
         (("given.onnx", "--look", "look.pt"), "would be overwritten"),
         (("given.onnx", "--no-look", "-o", "new.onnx"), "has no close look to remove"),
-        (("given.onnx", "--look", "look.pt", "-o", "new.onnx", "--layout", "plain"), "--layout can't change"),
         (("given.onnx", "--look", "look.pt", "-o", "new.onnx", "--radius", "0"), "--radius can't change"),
         (("given.onnx", "--to-yaml", "--edge", "same", "--max-distance", "9"), "--to-yaml, --max-distance, --edge"),
         (("missing.onnx", "--look", "look.pt", "-o", "new.onnx"), "No such file"),

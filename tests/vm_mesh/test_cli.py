@@ -71,7 +71,7 @@ def test_show_draws_walls_by_direction_and_not_on_the_ground(tmp_path, capsys):
 
 def test_show_draws_on_a_picture(tmp_path, capsys):
     file = tmp_path / "mesh.png"
-    run(capsys, "show", "--network", "ball-small", "--image", IMAGE, "--lens", LENS, "-o", file)
+    run(capsys, "show", "--network", "ball", "--image", IMAGE, "--lens", LENS, "-o", file)
     drawn, picture = cv2.imread(str(file)), cv2.imread(str(IMAGE))
     again = cv2.resize(picture, drawn.shape[1::-1], interpolation=cv2.INTER_LINEAR)
     changed = np.abs(drawn.astype(int) - again).max(axis=2) > 25

@@ -5,7 +5,7 @@ import numpy as np
 
 from vm_synth.dataset.picture_writer import write_picture
 from vm_synth.dataset.plan import Plan
-from vm_synth.render.picture import UNLABELED, Picture
+from vm_synth.render.picture import UNLABELED, Render
 from vm_synth.scene.camera import CameraRanges
 from vm_synth.scene.configuration import CLASSES, GroundRanges, SceneConfiguration, TargetRanges, ThingRanges
 from vm_synth.scene.draw_scene import draw_scene
@@ -46,7 +46,7 @@ def picture_of(scene):
             classes[area > 0] = CLASSES.index("ball")
     radiance = np.full((height, width, 3), 0.05, dtype=np.float32)
     radiance[coverage > 0] = 0.6
-    return Picture(radiance, classes, coverage)
+    return Render(radiance, classes, coverage)
 
 
 def write_set(folder, indices, count=None):

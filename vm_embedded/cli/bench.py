@@ -155,7 +155,7 @@ def _figures(model: ModelFile, work: Workload, detectors: Sequence[Detector], ru
     frames = len(work.orientations)
     return {
         "machine": describe_machine(),
-        "model": {"file": model.path.name, "sha256": model.sha256, "layout": model.manifest.layout},
+        "model": {"file": model.path.name, "sha256": model.sha256},
         "image": list(work.size),
         "walk": {
             "frames": frames,

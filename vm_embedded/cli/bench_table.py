@@ -11,7 +11,7 @@ def bench_table(found: dict[str, Any]) -> str:
     machine, cold, walk = found["machine"], found["cold"], found["walk"]
     lines = [
         f"{machine['processor']}, {machine['cores']} cores, {machine['vectors']}, onnxruntime {machine['onnxruntime']}",
-        f"{found['model']['file']}: layout {found['model']['layout']}, {found['operations_per_point']} operations "
+        f"{found['model']['file']}: {found['operations_per_point']} operations "
         f"per point; sgemm {found['sgemm_gflops']:g} GFLOP/s on one core",
         f"{walk['frames']} frames of {found['image'][0]}x{found['image'][1]}, "
         f"median {found['runs'][0]['points']} points, around height {walk['height_m']:.2f} m, "

@@ -25,7 +25,7 @@ class ClosingRemarks:
         self._radius = manifest.object_radius
         self._is_own_radius = detector.settings.object_radius is not None
         self._has_objects = any(each.kind == "object" for each in manifest.classes)
-        self._has_look = detector.look is not None
+        self._has_peaks = bool(manifest.peaks)
         self._doubt = ""  # the first one about a lens
         self._frames = self._shown = self._found = 0  # frames, those with mesh points, those with objects
         self._has_features = False  # whether a frame showed a feature of the field
@@ -46,8 +46,8 @@ class ClosingRemarks:
         """One line for each remark."""
         if self._doubt:
             yield self._doubt
-        # Without a close look, sizes are as coarse as the mesh.
-        hint = size_hint(self._sizes, self._radius) if self._has_look else ""
+        # Without peaks, sizes are as coarse as the mesh.
+        hint = size_hint(self._sizes, self._radius) if self._has_peaks else ""
         if hint:
             yield hint
         if self._frames and not self._shown:

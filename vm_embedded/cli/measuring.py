@@ -44,7 +44,7 @@ class Run:
         points = float(np.median(self.points))
         infer = float(np.median(self.stages["infer"]))
         return {
-            "threads": self.detector.session.threads,
+            "threads": self.detector.session.onnx.threads,
             "spinning": settings.spinning,
             "total_ms": _quantiles(self.total),
             "stages_ms": {
@@ -76,7 +76,7 @@ def measure(
     for detector in detectors:
         for _ in range(_WARM_UP_CALLS):
             detector.detect(image, orientations[0], lens)
-        detector.cache = MeshCache(detector.manifest, detector.settings, detector.session.arrange)
+        detector.cache = MeshCache(detector.manifest, detector.settings)
     timings: list[list[dict[str, float]]] = [[] for _ in detectors]
     points: list[list[int]] = [[] for _ in detectors]
     for frame, orientation in enumerate(orientations, start=1):
@@ -104,7 +104,7 @@ def measure_cold(detector: Detector, lens: Lens, size: Size, orientations: Seque
     lens = lens.for_image(size)
     new_mesh, known_mesh = [], []
     for orientation in orientations:
-        cache = MeshCache(detector.manifest, detector.settings, detector.session.arrange)
+        cache = MeshCache(detector.manifest, detector.settings)
         beside = Orientation.from_roll_pitch(
             orientation.height, orientation.roll, orientation.pitch + 2.0 * detector.settings.pitch_step
         )

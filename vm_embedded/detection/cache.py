@@ -35,16 +35,17 @@ _ROUNDING = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class PreparedPoints:
-    """The part of a mesh that a bucket keeps: the points that may be on screen, in the network's order, and for each
-    the level of the image pyramid (how often the image is halved) that gives its color."""
+    """The part of a mesh that a bucket keeps: the points that may be on screen, how the network takes them, and for
+    each the level of the image pyramid (how often the image is halved) that gives its color."""
 
+    mesh: Mesh
     layout: Layout
     levels: Levels
 
     @property
     def nbytes(self) -> int:
         """Memory that it holds [bytes]."""
-        return self.layout.nbytes + self.levels.nbytes
+        return self.mesh.nbytes + self.layout.nbytes + self.levels.nbytes
 
 
 class MeshCache:
@@ -53,15 +54,12 @@ class MeshCache:
     A mesh is kept under its height, and the prepared points of a bucket under (height, pitch, roll, lens, size), with
     pitch and roll as numbers of steps.
 
-    arrange: puts points in the network's order; without it, as the manifest says.
-
     `hits`, `misses`, `prepared` (buckets that `prepare_nearby` made) and `nbytes` [bytes] may be read at any time.
     """
 
-    def __init__(self, manifest: Manifest, settings: Settings, arrange: Callable[[Mesh], Layout] | None = None) -> None:
+    def __init__(self, manifest: Manifest, settings: Settings) -> None:
         self.manifest = manifest
         self.settings = settings
-        self._arrange = arrange or (lambda mesh: choose_layout(mesh, manifest))
         self.shape = manifest.mesh_shape
         self.hits = 0
         self.misses = 0
@@ -84,8 +82,8 @@ class MeshCache:
         if self.settings.height_tolerance == 0.0:
             # As in the reference: a mesh for each exact height, no buckets, and no turn of the mesh with the yaw.
             mesh = self._look_up(height, lambda: self._build(height))
-            part = mesh.part(np.flatnonzero(may_be_on_screen(mesh, orientation.rotation, lens, size, _ROUNDING)))
-            points, rotation, heading = self._in_order(part, height, lens), orientation.rotation, np.eye(3)
+            possible = may_be_on_screen(mesh, orientation.rotation, lens, size, _ROUNDING)
+            points, rotation, heading = self._prepared(mesh, possible, height, lens), orientation.rotation, np.eye(3)
         else:
             pitch = round(orientation.pitch / self.settings.pitch_step)
             roll = round(orientation.roll / self.settings.roll_step)
@@ -93,6 +91,7 @@ class MeshCache:
             points = self._look_up(key, lambda: self._prepare_bucket(height, pitch, roll, lens, size))
             rotation, heading = orientation.level, rotation_z(orientation.yaw)
         return PreparedView(
+            mesh=points.mesh,
             layout=points.layout,
             levels=points.levels,
             shape=self.manifest.object_shape,
@@ -165,12 +164,12 @@ class MeshCache:
 
         part = mesh.part(np.flatnonzero(possible(mesh, 0.0, 0.0, 0.5)))
         quarters = [possible(part, pitched, rolled, 0.25) for pitched in (-0.25, 0.25) for rolled in (-0.25, 0.25)]
-        return self._in_order(part.part(np.flatnonzero(np.any(quarters, axis=0))), height, lens)
+        return self._prepared(part, np.any(quarters, axis=0), height, lens)
 
-    def _in_order(self, mesh: Mesh, height: float, lens: Lens) -> PreparedPoints:
-        """The points of a part of a mesh in the network's order, with the levels of their colors."""
-        layout = self._arrange(mesh)
-        return PreparedPoints(layout, levels_for(self.manifest, layout, height, lens))
+    def _prepared(self, mesh: Mesh, possible: Mask, height: float, lens: Lens) -> PreparedPoints:
+        """The points of a mesh that may be on screen (n,), as far as the network needs them."""
+        mesh = mesh.part(np.flatnonzero(mesh.needed(possible)))
+        return PreparedPoints(mesh, choose_layout(mesh, self.manifest), levels_for(self.manifest, mesh, height, lens))
 
     def _look_up(self, key: Hashable, make: Callable[[], _Kept], counted: bool = True) -> _Kept:
         kept: _Kept | None = self._kept.get(key)

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Chosen, Floats, Mask, Singles
+from ..arrays import Chosen, Floats, Singles
 from .clustering import clusters, wider_than
 from .observation import Observation
+from .prepared_view import PreparedView
 from .projection import along
 from .settings import Settings
 
@@ -30,78 +31,63 @@ class Candidate:
     """A cluster that may be an object of a class.
 
     center (3,): of the object, relative to the camera in the mesh frame [m]; the cluster's middle until `fit` improves
-    it. near (p,): slots of the points up to three object radii around the cluster. probabilities, log_odds (p,): of
-    these points. reason: why it is not an object, or None if it is not rejected so far.
+    it. rays (p, 3), probabilities, log_odds (p,): of the points up to three object radii around the cluster. reason:
+    why it is not an object, or None if it is not rejected so far.
     """
 
     class_name: str
     center: Floats
-    near: Chosen
+    rays: Floats
     probabilities: Floats
     log_odds: Floats
     reason: str | None = None
 
 
 def propose(observation: Observation, class_name: str, probabilities: Singles, settings: Settings) -> list[Candidate]:
-    """Candidates of one class from the slots' probabilities (m,), largest cluster first.
+    """Candidates of one class from the points' probabilities (n,), largest cluster first.
 
     A cluster with the wrong size for its place is a candidate with a reason.
     """
-    likely = _on_screen(observation, probabilities > settings.threshold)
-    if not len(likely):
-        return []
+    mesh, rays, numbers = observation.view.mesh, observation.mesh_rays, observation.projected.answered
     candidates = []
-    for cluster in clusters(observation.layout, likely)[:_MOST_CLUSTERS]:
-        center = _middle(observation, cluster)
-        near = _around(observation, cluster, center)
+    for cluster in clusters(mesh, numbers[probabilities > settings.threshold])[:_MOST_CLUSTERS]:
+        center = _middle(observation.view, cluster)
+        near = _around(observation.view, cluster, center, rays)
+        around = rays[near]
         p = probabilities[near].astype(np.float64)
         log_odds = np.log(np.maximum(p, 1e-12) / np.maximum(1.0 - p, 1e-12)).clip(-_MOST_LOG_ODDS, _MOST_LOG_ODDS)
-        reason = _wrong_size(observation, cluster, center, near, settings)
-        candidates.append(Candidate(class_name, center, near, p, log_odds, reason))
+        reason = _wrong_size(observation.view, cluster, center, around, settings)
+        candidates.append(Candidate(class_name, center, around, p, log_odds, reason))
     return candidates
 
 
-def _on_screen(observation: Observation, chosen: Mask) -> Chosen:
-    """The chosen slots (m,) that are on screen, in the order of the mesh.
-
-    In this order, sums over them have the same digits for every layout.
-    """
-    members = np.flatnonzero(chosen & observation.projected.on_screen)
-    return members[np.argsort(observation.layout.slots[members])]
-
-
-def _middle(observation: Observation, cluster: Chosen) -> Floats:
-    """Center (3,) [m] of an object in the direction of a cluster's mean ray."""
-    view = observation.view
-    axis = view.layout.rays[cluster].mean(axis=0, keepdims=True)
+def _middle(view: PreparedView, cluster: Chosen) -> Floats:
+    """Center (3,) [m] of an object in the direction of the mean ray of a cluster's points of the mesh."""
+    axis = view.mesh.rays[cluster].mean(axis=0, keepdims=True)
     return np.asarray(view.shape.center_along(axis / np.linalg.norm(axis), view.height)[0])
 
 
-def _around(observation: Observation, cluster: Chosen, center: Floats) -> Chosen:
-    """All points on screen that are at most three object radii farther from `center` than the cluster's farthest."""
-    rays, radius = observation.layout.rays, observation.view.shape.radius
+def _around(view: PreparedView, cluster: Chosen, center: Floats, rays: Floats) -> Chosen:
+    """The rays (n, 3) that are at most three object radii farther from `center` than the cluster's farthest."""
     distance = float(np.linalg.norm(center))
-    cosines = along(rays, center / distance)
+    nearest = float(along(view.mesh.rays[cluster], center / distance).min())
     # Between unit vectors at an angle a, the chord is as long as sqrt(2 - 2 cos a).
-    chord = math.sqrt(2.0 * max(1.0 - float(cosines[cluster].min()), 0.0)) + 3.0 * radius / distance
-    return _on_screen(observation, cosines > 1.0 - 0.5 * min(chord, 2.0) ** 2)
+    chord = math.sqrt(2.0 * max(1.0 - nearest, 0.0)) + 3.0 * view.shape.radius / distance
+    return np.flatnonzero(along(rays, center / distance) > 1.0 - 0.5 * min(chord, 2.0) ** 2)
 
 
-def _wrong_size(
-    observation: Observation, cluster: Chosen, center: Floats, near: Chosen, settings: Settings
-) -> str | None:
+def _wrong_size(view: PreparedView, cluster: Chosen, center: Floats, near: Floats, settings: Settings) -> str | None:
     """Why a cluster around `center` has too few points or a too large graph diameter for an object, or None.
 
-    It rejects things of the wrong size, as in the paper's fig:ball_detection_images_3.
+    near (p, 3): rays to the points around. It rejects things of the wrong size, as in the paper's
+    fig:ball_detection_images_3.
     """
-    view = observation.view
-    rays = view.layout.rays
-    expected = int((view.shape.offset(rays[near], center[None], view.height) < 1.0).sum())
+    expected = int((view.shape.offset(near, center[None], view.height) < 1.0).sum())
     # A filled object has more than half of its points in its cluster. A quarter is enough, because `center` may be off.
     if len(cluster) < 0.25 * expected:
         return f"{len(cluster)} points, where an object there has {expected}"
     widest = math.ceil(settings.max_widths * view.rings)
-    middle = int(np.argmax(rays[cluster] @ center))
-    if wider_than(view.layout, cluster, middle, widest):
+    middle = int(np.argmax(view.mesh.rays[cluster] @ center))
+    if wider_than(view.mesh, cluster, middle, widest):
         return f"wider than {widest} steps in the mesh, where an object is {view.rings:.1f} wide"
     return None

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Chosen
-from ..mesh.mesh import PointGraph
+from ..mesh.mesh import Mesh
 
 _Edges = tuple[Chosen, Chosen]
 
 
-def clusters(graph: PointGraph, members: Chosen) -> list[Chosen]:
+def clusters(mesh: Mesh, members: Chosen) -> list[Chosen]:
     """The connected components of the points `members`, largest first. Points keep their order.
 
     Two points are connected if either is a neighbor of the other. In each round the smallest label spreads along all
     links at once, then each point takes the label of its label. So the number of rounds grows with the logarithm of a
     component's width, without a loop over points.
     """
-    a, b = _edges(graph, members)
+    a, b = _edges(mesh, members)
     label = np.arange(len(members))
     while True:
         spread = label.copy()
@@ -32,31 +32,31 @@ def clusters(graph: PointGraph, members: Chosen) -> list[Chosen]:
     return sorted(parts, key=len, reverse=True)
 
 
-def graph_diameter(graph: PointGraph, members: Chosen, limit: int) -> int:
+def graph_diameter(mesh: Mesh, members: Chosen, limit: int) -> int:
     """Steps between the two members farthest apart, on ways through members only; at most limit + 1.
 
     Two breadth-first sweeps, the second from the end of the first: exact for chains, at most a step or two short for
     round clusters.
     """
-    edges = _edges(graph, members)
+    edges = _edges(mesh, members)
     far = int(np.argmax(_steps(edges, len(members), 0, limit)))
     return int(_steps(edges, len(members), far, limit).max())
 
 
-def wider_than(graph: PointGraph, members: Chosen, middle: int, limit: int) -> bool:
+def wider_than(mesh: Mesh, members: Chosen, middle: int, limit: int) -> bool:
     """Whether the graph diameter of `members` is above `limit`.
 
     One sweep from the member in the `middle` usually decides: no two members are farther apart than twice its reach.
     """
-    reach = int(_steps(_edges(graph, members), len(members), middle, limit).max())
-    return 2 * reach > limit and graph_diameter(graph, members, limit) > limit
+    reach = int(_steps(_edges(mesh, members), len(members), middle, limit).max())
+    return 2 * reach > limit and graph_diameter(mesh, members, limit) > limit
 
 
-def _edges(graph: PointGraph, members: Chosen) -> _Edges:
+def _edges(mesh: Mesh, members: Chosen) -> _Edges:
     """Links between members, as positions in `members`, in both directions."""
-    position = np.full(len(graph) + 1, -1)
+    position = np.full(len(mesh) + 1, -1)
     position[members] = np.arange(len(members))
-    links = graph.links(members)
+    links = np.take(mesh.neighbors, members, axis=0)
     ends = position[links].ravel()
     linked = np.flatnonzero(ends >= 0)
     starts, ends = linked // links.shape[1], ends[linked]

@@ -7,9 +7,10 @@ the contrast: relative to them every field looks alike.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
-from ..arrays import Mask, Singles
+from ..arrays import Image, Mask, Singles
 
 _LEAST_DEVIATION = 0.02
 """Deviation of a picture without contrast: its noise must not become a pattern."""
@@ -34,3 +35,16 @@ def normalized(colors: Singles, kind: str, counted: Mask | None = None) -> Singl
     deviation = np.sqrt(np.square(deviations, out=deviations).mean(axis=1, keepdims=True))
     factor = (1.0 / np.maximum(deviation, _LEAST_DEVIATION)).astype(np.float32)
     return np.asarray((colors - mean.astype(np.float32)) * factor)
+
+
+def normalized_canvas(canvas: Image, channels: tuple[int, int, int], kind: str, counted: Mask) -> Singles:
+    """The same from the colors of a canvas (rows, columns[, channels]), from 0 to 255: (3, n).
+
+    channels: positions of red, green and blue. counted (n,): see `normalized`. Sums are exact.
+    """
+    planes = np.asarray(cv2.dnn.blobFromImage(canvas, 1.0 / 255.0), dtype=np.float32).reshape(-1, len(counted))
+    if kind == "relative" and counted.any():
+        mean, deviation = cv2.meanStdDev(canvas, mask=counted.view(np.uint8).reshape(canvas.shape[:2]))
+        planes -= (mean / 255.0).astype(np.float32)
+        planes *= (1.0 / np.maximum(deviation / 255.0, _LEAST_DEVIATION)).astype(np.float32)
+    return planes[list(channels)]

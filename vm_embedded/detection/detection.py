@@ -21,14 +21,12 @@ class Detection(Record):
     class_name: name of its class. confidence: 0 to 1; with a close look its calibrated probability, otherwise the mean
     probability of the points inside its outline. center (2,) [px]: centroid of its outline. radius [px]: of a disk with
     the same area as its outline. outline (m, 2) [px]: the part that the lens sees. bearing (3,): unit vector from the
-    camera to its center. position (3,) [m]: its center: where the bearing meets the plane that is parallel to the
-    observation plane, at the height of the object's center. distance [m]: from the camera to this center.
-    angular_radius [rad]: angle from its center to its outline. With a close look, it follows from the size that the
-    close look saw; without one, from the size that fits the points best. distance_by_angle [m]: distance that follows
-    from `angular_radius` and the real radius. distances_agree: whether the apparent size is near the size expected at
-    `distance`, within 20 % with a close look, otherwise within one ring spacing of the mesh. points: number of mesh
-    points inside its outline. reason: why a candidate was rejected; an object has none. track: the object over several
-    frames, if a Tracker follows it.
+    camera to its center. position (3,) [m]: of its center, where the bearing reaches the height of an object's center.
+    distance [m]: from the camera to this center. angular_radius [rad]: angle from its center to its outline, measured
+    by the close look, or else by the points. distance_by_angle [m]: distance that follows from `angular_radius` and the
+    real radius. distances_agree: whether the apparent size is near the size expected at `distance`, within 20 % with a
+    close look, otherwise within one ring spacing of the mesh. points: number of mesh points inside its outline. reason:
+    why a candidate was rejected; an object has none. track: the object over several frames, if a Tracker follows it.
     """
 
     class_name: Annotated[str, Sent(name="class")]

@@ -15,6 +15,7 @@ from ..network.session import Session
 from .cache import MeshCache
 from .detections import Detections
 from .field_points import locate_features
+from .looking import judge_classes
 from .objects import locate
 from .observation import Observation, observe
 from .pixel_formats import checked_image
@@ -42,9 +43,8 @@ class Detector:
         self.settings = settings or Settings()
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)
-        self.look = CloseLook.of(model, self.settings.threads, self.settings.spinning)
-        self.upright_looks = CloseLook.of_uprights(model, self.settings.threads, self.settings.spinning)
-        self.cache = MeshCache(self.manifest, self.settings, self.session.arrange)
+        self.looks = CloseLook.of(model, self.settings.threads, self.settings.spinning)
+        self.cache = MeshCache(self.manifest, self.settings)
         self.shape = self.manifest.object_shape
 
     @classmethod
@@ -108,9 +108,10 @@ class Detector:
         The result keeps the frame in memory. Raises ModelError if the close look does not run.
         """
         watch = Stopwatch()
-        found, rejected = locate(observation, self.look, self.settings, watch, explain)
         is_wanted = self.settings.field_features
-        features = locate_features(observation, self.upright_looks, self.settings) if is_wanted else None
+        judged = judge_classes(observation, self.looks, self.settings, watch, explain, is_wanted)
+        found, rejected = locate(observation, judged, self.settings, watch, explain)
+        features = locate_features(observation, judged) if is_wanted else None
         if features is not None:
             watch.lap("field")
         timing = {**observation.timing_ms, **watch.stages}

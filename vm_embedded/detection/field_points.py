@@ -2,75 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arrays import Floats
 from ..field.features import FieldFeatures
 from ..field.find import find_features
-from ..field.ground_points import ROLES, GroundPoints
-from ..field.uprights import KINDS as UPRIGHTS
-from .looking import Look
+from ..field.ground_points import ROLES, GroundMap, GroundPoints, ground_map
+from ..mesh.mesh import Mesh
+from .looking import Judged
 from .observation import Observation
-from .prepared_view import PreparedView
 from .profiles import brightness_along
-from .settings import Settings
-from .upright_looks import find_bases
-from .upright_peaks import peak_bases
+from .upright_bases import uprights_at
 
-_LOWEST = 1e-3
-"""Rays less steep than this do not meet the plane near enough to matter."""
+_MAPS: WeakKeyDictionary[Mesh, GroundMap] = WeakKeyDictionary()
+"""Where the rays of meshes meet the plane, as long as a cache keeps these."""
 
 
-def locate_features(observation: Observation, looks: Mapping[str, Look], settings: Settings) -> FieldFeatures | None:
+def locate_features(observation: Observation, judged: Judged) -> FieldFeatures | None:
     """Goal posts, robots, lines and border; None if the network has no class for any of them.
 
-    looks: look networks for classes of uprights, by class. Peaks show the uprights of the other classes, and rules find
-    those of classes without peaks. Raises ModelError if a look network does not run.
+    judged: what is at the peaks; only a network with peaks for them shows posts and robots.
     """
     names = [each.name for each in observation.manifest.classes]
     if not set(ROLES) & set(names):
         return None
     view, pyramid = observation.view, observation.pyramid
-    uprights = [name for name in observation.manifest.peaks if name in UPRIGHTS and name not in looks]
-    bases = {name: peak_bases(observation, name, settings) for name in uprights}
-    bases |= {name: find_bases(observation, look, settings) for name, look in looks.items()}
+    posts, robots = (
+        uprights_at(name, judged[name][0].view, judged[name][1]) if name in judged else () for name in ("goal", "robot")
+    )
     return find_features(
         ground_points(observation),
-        lambda places: _pixels(view, places),
+        view.picture_pixels,
         lambda stretches, count: brightness_along(view, pyramid, stretches, count),
-        bases,
+        posts,
+        robots,
     )
 
 
 def ground_points(observation: Observation) -> GroundPoints:
     """The points of an observation on the plane."""
-    view, classes = observation.view, observation.manifest.classes
-    rays = observation.layout.rays.T
-    upward = rays[2, observation.shown]
-    order = np.argsort(upward, kind="stable")  # the mesh is nearly in this order
-    order = order[: np.searchsorted(upward, -_LOWEST, sorter=order)]
-    slots, scale = observation.shown[order], -view.height / upward[order]
-    positions = np.array([rays[0, slots] * scale, rays[1, slots] * scale])
-    columns = [  # 0 for NaN: one NaN would spoil the sums of all others
-        (each, np.fmax(column[slots], 0.0))
-        for each, column in zip(classes, observation.slot_probabilities.T, strict=True)
-        if each.kind == "background" or each.name in ROLES
-    ]
+    view, mesh, answered = observation.view, observation.view.mesh, observation.projected.answered
+    ground = _MAPS.get(mesh)
+    if ground is None:
+        core = np.arange(len(mesh)) if mesh.margin is None else np.flatnonzero(~mesh.margin)
+        ground = _MAPS[mesh] = ground_map(mesh.rays, core)
+    classes = observation.manifest.classes
+    names = [each.name for each in classes]
+    signs = [-1.0 if each.kind == "background" else float(each.name in ("field", "line")) for each in classes]
+    weights = np.array([[float(each == "line") for each in names], signs], dtype=np.float32)
+    values = np.zeros((2, len(mesh)), dtype=np.float32)
+    # One NaN would spoil the sums of all others.
+    values[:, answered] = weights @ np.fmax(observation.probabilities.T, np.float32(0.0))
     return GroundPoints(
-        positions=(view.heading[:2, :2] @ positions).T,
+        map=ground,
+        shown=observation.projected.core,
+        line=values[0],
+        inside=values[1] if "field" in names else None,
         height=view.height,
         across=view.shape.radius * view.ring_spacing,
-        classes={each.name: column for each, column in columns if each.name in ROLES},
-        outside=sum(
-            (column for each, column in columns if each.kind == "background"), np.zeros(len(slots), np.float32)
-        ),
-        ahead=view.heading[:2, 0],
+        heading=view.heading[:2, :2],
     )
-
-
-def _pixels(view: PreparedView, places: Floats) -> Floats:
-    """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN where the frame does not show them."""
-    pixels = view.plane_pixels(places)
-    return np.where(view.in_picture(pixels)[:, None], pixels, np.nan)

@@ -30,7 +30,7 @@ def fit(view: PreparedView, candidate: Candidate) -> Candidate:
     cuts gets its true center.
     """
     center = candidate.center
-    rays = np.ascontiguousarray(view.layout.rays[candidate.near])
+    rays = np.ascontiguousarray(candidate.rays)
     for reach in _REACHES:
         distance = float(np.linalg.norm(center))
         axis = center / distance

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ..arrays import Floats, frozen
 from ..geometry.lens import Lens
 from ..geometry.shape import Shape
-from ..mesh.mesh import PointGraph
+from ..mesh.mesh import Mesh
 from ..mesh.octaves import strip_rays
 from ..network.manifest import Manifest
 
@@ -67,20 +67,19 @@ class Levels:
         return self.order.nbytes + self.places.nbytes + self.halvings.nbytes
 
 
-def levels_for(manifest: Manifest, graph: PointGraph, height: float, lens: Lens) -> Levels:
-    """The levels of a graph's points. A network that samples single pixels takes all from the whole picture.
+def levels_for(manifest: Manifest, mesh: Mesh, height: float, lens: Lens) -> Levels:
+    """The levels of a mesh's points. A network that samples single pixels takes all from the whole picture.
 
     height: of the camera that the mesh is made for [m]. lens: fitted to the image.
     """
     if manifest.sampling == "bilinear":
-        return uniform_levels(len(graph), 1.0)
+        return uniform_levels(len(mesh), 1.0)
     shape, k = manifest.mesh_shape, manifest.intersections
-    if graph.strips is None:
-        return Levels.of(level_of(footprint_widths(graph.rays, shape, height, k, lens.scale)))
-    # One width for each strip, whatever part of the strip is in the graph.
+    if mesh.strips is None:
+        return Levels.of(level_of(footprint_widths(mesh.rays, shape, height, k, lens.scale)))
+    # One width for each strip, whatever part of the strip is in the mesh.
     middle = strip_rays(shape, height, k, manifest.max_distance)
-    widths = np.append(footprint_widths(middle, shape, height, k, lens.scale), 0.0)  # the last is that of gaps, -1
-    return Levels.of(level_of(widths)[graph.strips])
+    return Levels.of(level_of(footprint_widths(middle, shape, height, k, lens.scale))[mesh.strips])
 
 
 def footprint_widths(rays: Floats, shape: Shape, height: float, intersections: float, scale: float) -> Floats:

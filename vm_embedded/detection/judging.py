@@ -40,7 +40,7 @@ def _misfit(view: PreparedView, candidate: Candidate, settings: Settings) -> str
     center, p = candidate.center, candidate.probabilities
     if center[2] >= 0.0 or np.linalg.norm(center) > _FARTHEST * view.height:
         return "on the horizon or above it"
-    offset = view.shape.offset(view.layout.rays[candidate.near], center[None], view.height)[0]
+    offset = view.shape.offset(candidate.rays, center[None], view.height)[0]
     whole = math.pi / 4.0 * view.rings**2  # its bounding square has rings^2 points, and a disk fills pi / 4 of that
     visible = int((offset < 1.0).sum())
     if visible < settings.min_visible * whole:

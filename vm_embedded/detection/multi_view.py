@@ -14,6 +14,7 @@ from ..geometry.lens import Lens
 from ..geometry.planes import GROUND, Plane, Pose
 from .detection import Detection
 from .detector import Detector
+from .looking import judge_classes
 from .objects import locate
 from .stopwatch import Stopwatch
 
@@ -91,7 +92,8 @@ def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) 
         return
     observation = detector.observe(view.image, orientation, view.lens)
     # Not detector.locate, which would also search for features of the field.
-    for each in locate(observation, detector.look, detector.settings, Stopwatch())[0]:
+    judged = judge_classes(observation, detector.looks, detector.settings, Stopwatch(), uprights=False)
+    for each in locate(observation, judged, detector.settings, Stopwatch())[0]:
         position = plane.to_world(each.position[None], view.pose)[0]
         away = position - view.pose.position
         yield Sighting(camera, plane.name, each, position, away / np.linalg.norm(away))

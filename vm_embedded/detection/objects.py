@@ -1,8 +1,8 @@
 """From an observation to objects on the plane.
 
-For the class of the close look, peaks or likely points propose places, and a second network judges each of them
-(`looking.py`). Without a close look, the peaks of a class are its objects. For any other class, clusters of likely
-points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`, `judging.py`).
+The peaks of a class are its objects, after a close look if there is one (`looking.py`). Without peaks, clusters of
+likely points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`,
+`judging.py`).
 """
 
 from __future__ import annotations
@@ -17,37 +17,32 @@ from .candidates import Candidate, propose
 from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
-from .looking import Judgment, Look, judge_peaks, look_closely
+from .looking import Judged, Judgment
 from .observation import Observation
 from .projection import along
 from .settings import Settings
 from .stopwatch import Stopwatch
 
 _SAME_SIZE = 0.2
-"""With a close look, a Detection's `distance` and `distance_by_angle` agree if its apparent size differs from the
+"""With peaks, a Detection's `distance` and `distance_by_angle` agree if its apparent size differs from the
 expected one by at most this share."""
 
 
 def locate(
-    observation: Observation, look: Look | None, settings: Settings, watch: Stopwatch, explain: bool = False
+    observation: Observation, judged: Judged, settings: Settings, watch: Stopwatch, explain: bool = False
 ) -> tuple[tuple[Detection, ...], tuple[Detection, ...]]:
     """The objects that an observation shows, most confident first, and, with `explain`, the rejected candidates.
 
-    It searches only for classes of the kind "object". watch: gets the stage cluster; with a close look also propose and
-    look. Raises ModelError if the close look does not run.
+    It searches only for classes of the kind "object". judged: what is at the peaks. watch: gets the stage cluster.
     """
     objects: list[Detection] = []
     rejected: list[Detection] = []
-    for object_class, probabilities in zip(observation.manifest.classes, observation.slot_probabilities.T, strict=True):
+    for object_class, probabilities in zip(observation.manifest.classes, observation.probabilities.T, strict=True):
         name = object_class.name
         if object_class.kind != "object":
             continue
-        if look is not None and look.contract.object_class == name:
-            judged = look_closely(observation, look, probabilities, settings, watch, explain)
-            found = [_describe_judgment(observation, name, each) for each in judged]
-        elif name in observation.manifest.peaks:
-            judged = judge_peaks(observation, name, settings, explain)
-            found = [_describe_judgment(observation, name, each) for each in judged]
+        if name in judged:
+            found = [_describe_judgment(observation, name, each) for each in judged[name][1]]
         else:
             candidates = _candidates(observation, name, probabilities, settings)
             found = [_describe_candidate(observation, each) for each in candidates if explain or each.reason is None]
@@ -60,7 +55,7 @@ def locate(
 def _candidates(
     observation: Observation, class_name: str, probabilities: Singles, settings: Settings
 ) -> list[Candidate]:
-    """The candidates of a class without a close look; those that are not objects have a reason."""
+    """The candidates of a class without peaks; those that are not objects have a reason."""
     view = observation.view
     accepted: list[Candidate] = []
     rejected: list[Candidate] = []
@@ -74,7 +69,7 @@ def _candidates(
 def _describe_candidate(observation: Observation, candidate: Candidate) -> Detection:
     """The candidate as a detection: its confidence is the mean probability of the points inside its outline."""
     view = observation.view
-    offset = view.shape.offset(view.layout.rays[candidate.near], candidate.center[None], view.height)[0]
+    offset = view.shape.offset(candidate.rays, candidate.center[None], view.height)[0]
     inside = candidate.probabilities[offset < 1.0]
     scale = best_scale(view, candidate, offset)
     return _detection(
@@ -91,9 +86,9 @@ def _describe_candidate(observation: Observation, candidate: Candidate) -> Detec
 
 
 def _describe_judgment(observation: Observation, class_name: str, judgment: Judgment) -> Detection:
-    """What a close look saw, as a detection."""
+    """A peak or what a close look saw there, as a detection."""
     view = observation.view
-    covered = view.shape.covers(view.layout.rays, judgment.center[None], view.height)[0]
+    covered = view.shape.covers(observation.mesh_rays, judgment.center[None], view.height)[0]
     return _detection(
         observation,
         class_name,
@@ -101,7 +96,7 @@ def _describe_judgment(observation: Observation, class_name: str, judgment: Judg
         confidence=judgment.confidence,
         scale=judgment.scale,
         distances_agree=abs(judgment.scale - 1.0) <= _SAME_SIZE,
-        points=int(np.count_nonzero(covered & observation.projected.on_screen)),
+        points=int(np.count_nonzero(covered)),
         reason=judgment.reason,
     )
 
@@ -148,9 +143,7 @@ def _detection(
 
 def _nearest_pixel(observation: Observation, direction: Floats) -> Floats:
     """The pixel (2,) of the point on screen that is nearest to a direction (3,) in the mesh frame."""
-    seen = observation.projected
-    nearness = np.where(seen.on_screen, along(observation.layout.rays, direction), -np.inf)
-    return np.asarray(seen.pixels[int(np.argmax(nearness))])
+    return np.asarray(observation.pixels[int(np.argmax(along(observation.mesh_rays, direction)))])
 
 
 def _disk(outline: Floats) -> tuple[Floats, float]:

@@ -9,11 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Floats, Indices, Mask, Singles
+from ..arrays import Chosen, Floats, Mask, Singles
 from ..network.canvas_layout import CanvasLayout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
-from .color_normalization import normalized
+from .color_normalization import normalized, normalized_canvas
 from .peaks import Peaks, peaks_of
 from .prepared_view import PreparedView
 from .projection import Projection, project
@@ -24,84 +24,66 @@ from .stopwatch import Stopwatch
 from .strip_sampling import sample_strips
 
 
-class Network(Protocol):
+class Classifier(Protocol):
     """Anything that gives points their probabilities: a Session, or a network in torch."""
 
-    def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """All outputs (m, outputs) for a layout's slots, from their colors (3, m) and which slots (m,) are on screen.
-
-        See `Manifest.outputs`.
-        """
+    def run(self, layout: Layout, colors: Singles, on_screen: Mask, points: Chosen) -> Singles:
+        """All outputs (k, outputs) for points (k,) on screen; see `Layout.answers` and `Manifest.outputs`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Observation:
     """A frame's n points on screen with their probabilities, before objects are located among them.
 
-    pyramid: the frame. view: its mesh points, lens and orientation. manifest: of the network. projected: pixels of the
-    m slots of the layout. A slot is one place in the network's input; it holds a point, a copy of a point, or nothing.
-    Only original points count as on screen. slot_answers (m, outputs): the network's outputs, as `Manifest.outputs`
-    counts them; they have no meaning for slots off screen. timing_ms: time of each stage [ms].
+    All are in the order of the mesh. pyramid: the frame. view: its mesh, lens and orientation. manifest: of the
+    network. projected: the view's mesh in the picture; the n points are `Projection.answered`. answers (n, outputs):
+    the network's outputs, as `Manifest.outputs` counts them. timing_ms: time of each stage [ms].
     """
 
     pyramid: Pyramid
     view: PreparedView
     manifest: Manifest
-    projected: Projection[Layout]
-    slot_answers: Singles
+    projected: Projection
+    answers: Singles
     timing_ms: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        return len(self.shown)
-
-    @property
-    def layout(self) -> Layout:
-        """The network's order of the points."""
-        return self.view.layout
-
-    @property
-    def slot_probabilities(self) -> Singles:
-        """Probabilities (m, C) of the slots."""
-        return self.slot_answers[:, : len(self.manifest.classes)]
-
-    @cached_property
-    def shown(self) -> Indices:
-        """Slots (n,) of the points on screen, in the order of the mesh."""
-        places = self.layout.places
-        return places[self.projected.on_screen[places]]
+        return len(self.answers)
 
     @cached_property
     def pixels(self) -> Floats:
         """Pixels (n, 2) of the points."""
-        return self.projected.pixels[self.shown]
+        return self.projected.pixels[self.projected.answered]
+
+    @cached_property
+    def mesh_rays(self) -> Floats:
+        """Unit vectors (n, 3) from the camera to the points, in the mesh frame, column by column in memory."""
+        return np.take(self.view.mesh.rays.T, self.projected.answered, axis=1).T
 
     @cached_property
     def rays(self) -> Floats:
         """Unit vectors (n, 3) from the camera to the points, in the plane's frame, as in Detection."""
-        return np.asarray(self.layout.rays[self.shown] @ self.view.heading.T)
+        return np.asarray(self.mesh_rays @ self.view.heading.T)
 
-    @cached_property
+    @property
     def probabilities(self) -> Singles:
         """Probabilities (n, C) of the points, in the order of the manifest's classes."""
-        return self.slot_probabilities[self.shown]
-
-    def find_peaks(self, class_name: str, most: int) -> Peaks:
-        """At most `most` peaks of a class that the network has peaks for (`Manifest.peaks`), best first."""
-        return self._peaks[class_name].part(slice(most))
+        return self.answers[:, : len(self.manifest.classes)]
 
     @cached_property
-    def _peaks(self) -> Mapping[str, Peaks]:
-        return peaks_of(self.slot_answers, self.projected.on_screen, self.view, self.manifest)
+    def peaks(self) -> Mapping[str, Peaks]:
+        """The peaks of each class that the network has peaks for (`Manifest.peaks`), best first."""
+        return peaks_of(self.answers, self.projected.answered, self.view, self.manifest)
 
 
 def observe(
-    pyramid: Pyramid, view: PreparedView, manifest: Manifest, network: Network, settings: Settings, watch: Stopwatch
+    pyramid: Pyramid, view: PreparedView, manifest: Manifest, network: Classifier, settings: Settings, watch: Stopwatch
 ) -> Observation:
     """Project the view's points into the frame and classify them.
 
     watch: gets the stages project, sample and infer. Raises ModelError if the network does not run.
     """
-    projected = project(view.layout, view.rotation, view.lens, view.size)
+    projected = project(view.mesh, view.rotation, view.lens, view.size)
     watch.lap("project")
     return classify(pyramid, view, projected, manifest, network, settings, watch)
 
@@ -109,22 +91,21 @@ def observe(
 def classify(
     pyramid: Pyramid,
     view: PreparedView,
-    projected: Projection[Layout],
+    projected: Projection,
     manifest: Manifest,
-    network: Network,
+    network: Classifier,
     settings: Settings,
     watch: Stopwatch,
 ) -> Observation:
     """Sample the frame at projected points, and let the network classify them. See `observe`."""
     layout = view.layout
-    # The network needs the colors of copies, too. They must not count twice in the mean color, nor in an object.
-    shown = projected.only(layout.original)
+    counted = layout.spread(projected.core)  # strips overlap in their margins, which must not count twice in the mean
     if isinstance(layout, CanvasLayout):
-        sampled = sample_strips(pyramid, projected.pixels, view.levels, layout)
+        canvas = sample_strips(pyramid, projected.pixels, view.levels, layout, projected.on_screen)
+        colors = normalized_canvas(canvas, pyramid.channels, manifest.colors, counted)
     else:
-        sampled = sample(pyramid, projected.pixels, view.levels)
-    colors = normalized(sampled, manifest.colors, shown.on_screen)
+        colors = normalized(sample(pyramid, projected.pixels, view.levels), manifest.colors, counted)
     watch.lap("sample")
-    answers = network.run(layout, colors, projected.on_screen)
+    answers = network.run(layout, colors, projected.on_screen, projected.answered)
     watch.lap("infer")
-    return Observation(pyramid, view, manifest, shown, answers, watch.stages)
+    return Observation(pyramid, view, manifest, projected, answers, watch.stages)

@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats, Mask
 from ..geometry.lens import Lens, Size
 from ..geometry.shape import Shape
+from ..mesh.mesh import Mesh
 from ..network.layout import Layout
 from .footprint import Levels
 from .projection import to_camera
@@ -17,14 +18,15 @@ from .projection import to_camera
 class PreparedView(NamedTuple):
     """The mesh points that can be on screen, the camera that sees them, and the object that is sought among them.
 
-    layout: the points in the network's order. levels: which picture of the pyramid colors each point. shape: of the
-    real object. rings: number of mesh rings that cross it. height: of the camera over the observation plane [m]. The
-    mesh frame is the observation plane's without the camera's yaw: x is ahead of the camera, z up. Objects are sought
+    mesh: the points. layout: how the network takes them. levels: which picture of the pyramid colors each point. shape:
+    of the real object. rings: number of mesh rings that cross it. height: of the camera over the plane [m]. The mesh
+    frame is the observation plane's without the camera's yaw: x is ahead of the camera, z up. Objects are sought
     in it. rotation (3, 3): camera to mesh frame. heading (3, 3): mesh frame to the observation plane's, a turn around
     the vertical; with a height tolerance of 0 the yaw is not removed, and heading is the identity. lens, size [px]: of
     the frame. A named tuple, because each frame makes one: a frozen dataclass takes four times as long.
     """
 
+    mesh: Mesh
     layout: Layout
     levels: Levels
     shape: Shape
@@ -65,3 +67,8 @@ class PreparedView(NamedTuple):
     def in_picture(self, pixels: Floats) -> Mask:
         """Which pixels (n, 2) are inside the picture; NaN is not."""
         return np.asarray(((pixels >= 0.0) & (pixels <= np.array(self.size) - 1.0)).all(axis=1))
+
+    def picture_pixels(self, places: Floats) -> Floats:
+        """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
+        pixels = self.plane_pixels(places)
+        return np.where(self.in_picture(pixels)[:, None], pixels, np.nan)

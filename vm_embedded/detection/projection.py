@@ -6,27 +6,23 @@ The paper projects the points of the mesh in the same way (section "Graph Struct
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Generic, TypeVar
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ..arrays import Floats, Mask
+from ..arrays import Chosen, Floats, Mask
 from ..geometry.lens import Lens, Size
-from ..mesh.mesh import Mesh, PointGraph
-
-AnyGraph = TypeVar("AnyGraph", bound=PointGraph)
-G = TypeVar("G", bound=PointGraph, covariant=True)
+from ..mesh.mesh import Mesh
 
 
 @dataclass(frozen=True, eq=False)
-class Projection(Generic[G]):
-    """The n points of a graph, their pixels (n, 2), and a mask of those that are on_screen (n,).
+class Projection:
+    """The n points of a mesh, their pixels (n, 2), and a mask of those that are on_screen (n,).
 
     Pixels of points off screen have no meaning.
     """
 
-    graph: G
+    graph: Mesh
     pixels: Floats
     on_screen: Mask
 
@@ -34,13 +30,23 @@ class Projection(Generic[G]):
         return len(self.graph)
 
     @property
-    def visible(self: Projection[Mesh]) -> Projection[Mesh]:
-        """The points of a mesh that are on screen."""
+    def visible(self) -> Projection:
+        """The points that are on screen."""
         kept = np.flatnonzero(self.on_screen)
         return Projection(self.graph.part(kept), self.pixels[kept], self.on_screen[kept])
 
-    def only(self, chosen: Mask) -> Projection[G]:
-        """The same graph; points outside of `chosen` (n,) count as off screen."""
+    @cached_property
+    def core(self) -> Mask:
+        """Which points (n,) are on screen and not in the margin of the mesh."""
+        return self.on_screen if self.graph.margin is None else self.on_screen & ~self.graph.margin
+
+    @cached_property
+    def answered(self) -> Chosen:
+        """The points (k,) of the core."""
+        return np.flatnonzero(self.core)
+
+    def only(self, chosen: Mask) -> Projection:
+        """The same mesh; points outside of `chosen` (n,) count as off screen."""
         return Projection(self.graph, self.pixels, self.on_screen & chosen)
 
 
@@ -72,15 +78,15 @@ def to_camera(rays: Floats, rotation: Floats) -> Floats:
     return camera.T
 
 
-def project(graph: AnyGraph, rotation: Floats, lens: Lens, size: Size) -> Projection[AnyGraph]:
-    """Project a graph's points into the picture.
+def project(mesh: Mesh, rotation: Floats, lens: Lens, size: Size) -> Projection:
+    """Project a mesh's points into the picture.
 
     rotation (3, 3): camera to mesh frame. size: width and height [px]. A point is on screen if the lens sees it and all
     four pixels around it are in the picture: 0 <= x and x + 1 < width, and the same for y.
     """
-    camera = to_camera(graph.rays, rotation)
+    camera = to_camera(mesh.rays, rotation)
     pixels = lens.project(camera, size)
-    return Projection(graph, pixels, lens.sees(camera) & _inside(pixels, size, 0.0))
+    return Projection(mesh, pixels, lens.sees(camera) & _inside(pixels, size, 0.0))
 
 
 def may_be_on_screen(mesh: Mesh, rotation: Floats, lens: Lens, size: Size, slack: float) -> Mask:

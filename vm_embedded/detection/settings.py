@@ -45,24 +45,15 @@ class Settings:
         (0.1, 1e4),
     )
     threshold: float = share(0.5, "a point belongs to a class if its probability is above this")
-    min_confidence: float = share(
-        0.3, "close look, and peaks of posts and robots: lowest probability of an object; below it, it is rejected"
-    )
-    max_proposals: int = number(
-        40, "close look, and peaks of posts and robots: largest number of proposals", "", (1, 1000)
-    )
+    min_confidence: float = share(0.3, "peaks: lowest probability of an object; below it, it is rejected")
     min_inside: float = share(
-        0.85, "without close look: lowest mean probability inside the outline; below it, the object is rejected"
+        0.85, "without peaks: lowest mean probability inside the outline; below it, the object is rejected"
     )
     max_around: float = share(
-        0.25, "without close look: highest mean probability just outside the outline; above it, the object is rejected"
+        0.25, "without peaks: highest mean probability just outside the outline; above it, the object is rejected"
     )
-    max_widths: float = number(
-        2.0, "without close look: reject clusters wider than this", "object widths", (1.0, 100.0)
-    )
-    min_visible: float = share(
-        0.25, "without close look: reject objects with a smaller share of their points on screen"
-    )
+    max_widths: float = number(2.0, "without peaks: reject clusters wider than this", "object widths", (1.0, 100.0))
+    min_visible: float = share(0.25, "without peaks: reject objects with a smaller share of their points on screen")
     field_features: bool = switch(
         True, "find goal posts, robots, lines and the border, if the network has the classes goal, robot, line or field"
     )

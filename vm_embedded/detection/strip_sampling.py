@@ -7,32 +7,31 @@ takes a quarter of the time of `sample`.
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
-from ..arrays import Floats, Singles
+from ..arrays import Floats, Image, Mask
 from ..network.canvas_layout import CanvasLayout
 from .footprint import Levels
 from .pyramid import Pyramid
 
 
-def sample_strips(pyramid: Pyramid, pixels: Floats, levels: Levels, layout: CanvasLayout) -> Singles:
-    """Red, green and blue (3, m), from 0 to 1, at pixels (m, 2) of the frame, one for each slot of a canvas.
+def sample_strips(pyramid: Pyramid, pixels: Floats, levels: Levels, layout: CanvasLayout, on_screen: Mask) -> Image:
+    """Colors of a canvas (rows, columns[, channels]), from pixels (n, 2) of the mesh's points.
 
-    levels: which picture of the pyramid colors each slot. The color is arbitrary where a pixel is outside of the image.
+    levels: which picture of the pyramid colors each point. on_screen (n,): the other points, and cells without a point,
+    have an arbitrary color.
     """
-    frame = pyramid.level(0)
-    canvas = np.zeros((*layout.shape, *frame.shape[2:]), dtype=np.uint8)
-    places = pixels.reshape(*layout.shape, 2)
-    halvings = levels.halvings.reshape(layout.shape)
+    shape = layout.shape
+    canvas = np.zeros((*shape, *pyramid.level(0).shape[2:]), dtype=np.uint8)
+    shown = layout.spread(on_screen).reshape(shape)
+    with np.errstate(over="ignore"):
+        places = [layout.spread(each).reshape(shape) for each in pixels.T.astype(np.float32)]
     for piece in layout.pieces:
-        level = int(halvings[piece.region].max())
-        with np.errstate(over="ignore"):
-            at = places[piece.region].astype(np.float32)
-        at += 0.5  # pixels count from the middle of the first one
-        at *= 0.5**level
-        at -= 0.5
-        colors = cv2.remap(pyramid.level(level), at, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)  # type: ignore[call-overload]
-        canvas[piece.region] = colors
-    planes = np.asarray(cv2.dnn.blobFromImage(canvas, 1.0 / 255.0), dtype=np.float32)  # one for each channel
-    return planes.reshape(-1, len(pixels))[list(pyramid.channels)]
+        region = piece.region
+        if shown[region].any():
+            level = int(levels.halvings[piece.point])
+            scale = np.float32(0.5**level)
+            # Pixels count from the middle of the first one.
+            x, y = (each[region] * scale + (scale - np.float32(1.0)) * np.float32(0.5) for each in places)
+            canvas[region] = pyramid.at(level, x, y, shown[region])
+    return canvas

@@ -4,21 +4,23 @@ Something that stands at the border hides it, so that the field seems to end nea
 hull of all places bridges such gaps. Grass-like ground outside makes the field seem to end farther away. Therefore
 hulls with fewer corners are tried, too, and the one that most places agree with is chosen. Reinhardt's
 "Kalibrierungsfreie Bildverarbeitungsalgorithmen" (HTWK Leipzig, 2011) found the border in a similar way.
+
+There are few places, and a hull changes only near a corner that is gone. So this works on lists of complex numbers: of
+conj(a) b, the imaginary part is the cross product of a and b.
 """
 
 from __future__ import annotations
 
+import sys
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
-from itertools import islice, pairwise
+from itertools import accumulate, groupby, islice, pairwise
+from operator import itemgetter
 
 import numpy as np
 
-from ..arrays import Chosen, Floats, Mask
-from .ground_points import GroundPoints, starts_of_runs
-
-_COLUMN = 0.04
-"""Width of a column of points [rad]."""
+from ..arrays import Floats
+from .ground_points import GroundPoints
 
 _FEWEST = 2.0
 """A column shows the border only if so many points behind it are outside, and so many in front are of the field."""
@@ -27,74 +29,92 @@ _AGREES = 0.03
 """A place agrees with a border if they differ by less than this share of the distance, or by less than the mesh can
 resolve."""
 
-_ENOUGH = 0.95
+_ENOUGH = 0.9
 """A hull that this share of the places agrees with is good enough."""
 
 _MOST_HULLS = 8
 """Largest number of hulls that are tried, each without a corner of the one before."""
 
+Hull = tuple[list[int], list[float]]
+"""Numbers of the places that are corners, from right to left, and how far each place is beyond the polyline through
+them, as a share of its distance there."""
+
 
 def find_border(points: GroundPoints) -> Floats:
     """Corners (m, 2) [m] of the visible border, from right to left; none if the frame does not show it."""
-    if not len(points.ranges):
-        return np.empty((0, 2))
     places, ended = _ends_of_field(points)
-    if np.count_nonzero(ended) < 3:
+    if sum(ended) < 3:
         return np.empty((0, 2))
     limit = max(_AGREES, points.across / points.height)
-    hulls = list(islice(_hulls(places), _MOST_HULLS))
-    beyond = _beyond(places, hulls)
-    agreeing = np.count_nonzero(np.abs(beyond) < limit, axis=1).tolist()
-    best = 0
-    for number, count in enumerate(agreeing):
-        if agreeing[best] > _ENOUGH * len(places):
-            break
-        if count > agreeing[best] + 1:  # one place more may agree by chance; then the hull with more corners stays
-            best = number
-    return _part_that_ends(np.array(hulls[best]), places, ended, beyond[best], limit)
+    best: Hull = [], []
+    most = -2
+    for hull in islice(_hulls(places), _MOST_HULLS):
+        agreeing = sum([-limit < each < limit for each in hull[1]])
+        if agreeing > most + 1:  # one place more may agree by chance; then the hull with more corners stays
+            best, most = hull, agreeing
+            if most > _ENOUGH * len(places):
+                break
+    border = np.array(_part_that_ends(places, ended, best, limit), dtype=np.complex128)
+    return border.view(np.float64).reshape(-1, 2)
 
 
-def _ends_of_field(points: GroundPoints) -> tuple[Floats, Mask]:
-    """The farthest place of the field (c, 2) [m] in each column of points, from right to left, and whether something
-    else begins there (c,); otherwise the field may go on where the frame or the mesh ends.
+def _ends_of_field(points: GroundPoints) -> tuple[list[complex], list[bool]]:
+    """The farthest place of the field [m] in each column of points, from right to left, and whether something else
+    begins there; otherwise the field may go on where the frame or the mesh ends.
 
     In each column, the place parts points of the field from points outside best: for points with the values 1, 1, -1
     and -1, from near to far, it is behind the second one.
     """
-    columns = ((points.azimuths + np.pi) * (1.0 / _COLUMN)).astype(np.int16)
-    order = np.argsort(columns, kind="stable")  # from near to far in each column, as the points are
-    inside = sum((points.classes[name] for name in ("field", "line") if name in points.classes), np.float32(0.0))
-    values = (inside - points.outside)[order]
+    ground = points.map
+    shown = points.shown.take(ground.by_column).nonzero()[0]
+    if points.inside is None or not len(shown):
+        return [], []
+    values = points.inside.take(ground.by_column.take(shown))
+    values[np.isnan(values)] = 0.0  # one NaN would spoil the sums of all others
     sums = np.cumsum(values, dtype=np.float64)
-    starts = starts_of_runs(columns[order])
-    final = np.append(starts[1:], len(sums)) - 1
+    bounds = np.searchsorted(shown, ground.bounds)
+    counts = bounds[1:] - bounds[:-1]
+    columns = np.flatnonzero(counts)
+    counts, starts = counts[columns], bounds[columns]
+    final = starts + counts - 1
     best = np.maximum.reduceat(sums, starts)
-    at_best = np.flatnonzero(sums == np.repeat(best, final + 1 - starts))
-    seen = best - (sums[starts] - values[starts]) >= _FEWEST
-    final, best = final[seen], best[seen]
+    at_best = np.flatnonzero(sums == np.repeat(best, counts))
     last = at_best[np.searchsorted(at_best, final, side="right") - 1]
-    far = 0.5 * (points.ranges[order[last]] + points.ranges[order[np.minimum(last + 1, final)]])
-    azimuths = (columns[order[final]] + 0.5) * _COLUMN - np.pi
-    return points.directions(azimuths) * far[:, None], best - sums[final] >= _FEWEST
+    seen = np.flatnonzero(best - sums[starts] + values[starts] >= _FEWEST)
+    far = ground.column_ranges[shown[np.array([last, np.minimum(last + 1, final)])[:, seen]]].sum(axis=0)
+    turn = 0.5 * points.height * complex(*points.heading[:, 0].tolist())
+    return (
+        (far * ground.directions[columns[seen]] * turn).tolist(),
+        (best - sums[final] >= _FEWEST)[seen].tolist(),
+    )
 
 
-def _hulls(places: Floats) -> Iterator[list[int]]:
-    """The hull of places (c, 2) from right to left, and others, each without a corner of the one before: the one that
-    is farthest beyond the places beside it."""
-    numbers = list(map(complex, *places.T.tolist()))
-    left, ranges = list(range(len(places))), list(map(abs, numbers))
-    corners = _hull(numbers, left)
-    yield corners
+def _hulls(places: Sequence[complex]) -> Iterator[Hull]:
+    """The hull of places from right to left, and others, each without a corner of the one before: the one that is
+    farthest beyond the places beside it."""
+    left, ranges = list(range(len(places))), list(map(abs, places))
+
+    def outward(corner: int) -> float:
+        at = bisect_left(left, corner)
+        return ranges[at] / (ranges[max(at - 1, 0)] + ranges[min(at + 1, len(left) - 1)])
+
+    corners = _hull(places, left)
+    peaks, beyond = list(map(outward, corners)), _beyond(places, corners)
+    yield corners, beyond
     while len(left) > 3:
-        sides = [ranges[0], *ranges, ranges[-1]]
-        where = [bisect_left(left, corner) for corner in corners]
-        beyond = [ranges[each] / (sides[each] + sides[each + 2]) for each in where]
-        at = beyond.index(max(beyond))
-        del left[where[at]], ranges[where[at]]
-        edges = [0, *where, len(places)]  # the hull changes only between the corners beside the one that is gone
-        between = _hull(numbers, left[edges[at] : edges[at + 2]])
-        corners = [*corners[: max(at - 1, 0)], *between, *corners[at + 2 :]]
-        yield corners
+        at = peaks.index(max(peaks))
+        gone = bisect_left(left, corners[at])
+        del left[gone], ranges[gone]
+        start = bisect_left(left, corners[at - 1]) if at else 0
+        end = bisect_left(left, corners[at + 1]) + 1 if at + 1 < len(corners) else len(left)
+        between = _hull(
+            places, left[start:end]
+        )  # the hull changes only between the corners beside the one that is gone
+        before = max(at - 1, 0)
+        corners = corners[:before] + between + corners[at + 2 :]
+        peaks[before : at + 2] = map(outward, between)
+        beyond = _beyond(places, corners, beyond, max(before - 1, 0), before + len(between))
+        yield corners, beyond
 
 
 def _hull(places: Sequence[complex], numbers: Sequence[int]) -> list[int]:
@@ -113,55 +133,54 @@ def _hull(places: Sequence[complex], numbers: Sequence[int]) -> list[int]:
     return corners
 
 
-def _beyond(places: Floats, hulls: Sequence[Sequence[int]]) -> Floats:
-    """How far places (c, 2) are beyond polylines through at least two of them, as a share of their distance there.
+def _beyond(
+    places: Sequence[complex],
+    corners: Sequence[int],
+    known: Sequence[float] = (),
+    first: int = 0,
+    end: int = sys.maxsize,
+) -> list[float]:
+    """How far places are beyond the polyline through at least two of them, as a share of their distance there.
 
-    hulls: numbers of the corners of h polylines. Returns the shares (h, c).
+    known: the result for a polyline that differs from this one only in the pieces from number `first` up to `end`.
     """
-    first, last = np.array([piece for corners in hulls for piece in pairwise(corners)]).T
-    (x, y), (along_x, along_y) = places[first].T, (places[last] - places[first]).T
-    # The ray t * place meets the line through a piece where (t * place - start) x along is 0.
-    lines = np.array([along_y, -along_x]) / (x * along_y - y * along_x)
-    counts = [count for corners in hulls for count in _counts(len(places), corners)]
-    x, y = np.repeat(lines, counts, axis=1).reshape(2, len(hulls), -1)
-    return np.asarray(x * places[:, 0] + y * places[:, 1] - 1.0)
+    beyond = list(known) or [0.0] * len(places)
+    edges = [0, *corners[1:-1], len(places)]  # the first and the last piece go on
+    for number in range(first, min(end, len(edges) - 1)):
+        place = places[corners[number]]
+        along = places[corners[number + 1]] - place
+        # The ray t * place meets the line through a piece where (t * place - start) x along is 0.
+        line = along / ((place.conjugate() * along).imag or 1e-9)
+        span = slice(edges[number], edges[number + 1])
+        beyond[span] = [(each.conjugate() * line).imag - 1.0 for each in places[span]]
+    return beyond
 
 
-def _counts(count: int, corners: Sequence[int]) -> list[int]:
-    """How many of `count` places are in the direction of each piece of a polyline through some of them."""
-    return [last - first for first, last in pairwise([0, *corners[1:-1], count])]
-
-
-def _part_that_ends(corners: Chosen, places: Floats, ended: Mask, beyond: Floats, limit: float) -> Floats:
-    """The longest part of a polyline along which the field ends, by the number of places that agree with it.
-
-    beyond (c,): see _beyond.
-    """
-    agrees = ended & (np.abs(beyond) < limit)
-    up_to = np.append(0, np.cumsum(agrees))  # how many places agree before each
-    agreeing = up_to[corners[1:] + 1] - up_to[corners[:-1]]
-    both = ended[corners[1:]] & ended[corners[:-1]]
-    kept = both | (agreeing > 0.5 * (corners[1:] - corners[:-1] + 1))
-    run = np.cumsum(np.append(kept[:1], kept[1:] != kept[:-1]))
-    support = np.bincount(run, np.where(kept, agreeing, 0))
-    longest = int(np.argmax(support))
-    if support[longest] < 3:
-        return np.empty((0, 2))
-    pieces = np.flatnonzero(run == longest)
-    part = slice(pieces[0], pieces[-1] + 2)
-    moved = _without_margin(places, corners, beyond, agrees)[part]
-    outer = next(_hulls(moved))  # each corner moved on its own, so some may point inward now
-    return np.asarray(moved[outer] * (1.0 + _beyond(moved, [outer]).mean()))
-
-
-def _without_margin(places: Floats, corners: Chosen, beyond: Floats, agrees: Mask) -> Floats:
-    """The corners moved from the outermost places to the middle of the places beside them.
-
-    beyond (c,): see _beyond. agrees (c,): which places count.
-    """
-    piece = np.repeat(np.arange(len(corners) - 1), _counts(len(places), corners.tolist()))
-    count = np.bincount(piece, agrees)
-    total = np.bincount(piece, np.where(agrees, beyond, 0.0))
-    beside = np.append(total, 0.0) + np.append(0.0, total)
-    beside /= np.maximum(np.append(count, 0.0) + np.append(0.0, count), 1.0)
-    return np.asarray(places[corners] * (1.0 + beside[:, None]))
+def _part_that_ends(places: Sequence[complex], ended: Sequence[bool], hull: Hull, limit: float) -> list[complex]:
+    """The longest part of a polyline along which the field ends, by the number of places that agree with it."""
+    corners, beyond = hull
+    agrees = [end and -limit < each < limit for end, each in zip(ended, beyond, strict=True)]
+    count = list(accumulate(agrees, initial=0))  # how many places agree before each
+    support = [
+        (count[last + 1] - count[first], ended[first] and ended[last], last + 1 - first)
+        for first, last in pairwise(corners)
+    ]
+    kept = [is_sure or agreeing > 0.5 * length for agreeing, is_sure, length in support]
+    runs = [list(run) for is_kept, run in groupby(range(len(kept)), kept.__getitem__) if is_kept]
+    agreeing, longest = max(
+        ((sum(support[each][0] for each in run), run) for run in runs), key=itemgetter(0), default=(0, [])
+    )
+    if agreeing < 3:
+        return []
+    # The corners move from the outermost places to the middle of the places beside them.
+    total = list(accumulate([each if agree else 0.0 for each, agree in zip(beyond, agrees, strict=True)], initial=0.0))
+    edges = [0, 0, *corners[1:-1], len(places), len(places)]
+    moved = []
+    for number in range(longest[0], longest[-1] + 2):
+        first, last = edges[number], edges[number + 2]
+        moved.append(
+            places[corners[number]] * (1.0 + (total[last] - total[first]) / max(count[last] - count[first], 1))
+        )
+    outer = _hull(moved, range(len(moved)))  # each corner moved on its own, so some may point inward now
+    larger = 1.0 + sum(_beyond(moved, outer)) / len(moved)
+    return [moved[each] * larger for each in outer]

@@ -9,15 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from ..arrays import Chosen, Floats
-from .lines import LinePoints
+from .lines import LinePoints, tolerance
 
 _TRIES = 300
 """Number of circles that are tried."""
 
-_SHARES = np.outer(np.arange(1, _TRIES + 1), np.sqrt([2.0, 3.0, 5.0])) % 1.0
+_SHARES = np.outer(np.sqrt([2.0, 3.0, 5.0]), np.arange(1, _TRIES + 1)) % 1.0
 """The three points of each circle, as shares of the number of points: multiples of an irrational number are spread
 evenly."""
 
@@ -63,72 +64,86 @@ def find_circle(points: LinePoints, free: Chosen) -> CirclePoints | None:
     """
     if len(free) < _FEWEST:
         return None
-    searched = points.part(free)
-    best = _best_circle(searched.part(slice(None, None, -(-len(free) // _MOST_VOTERS))))
+    best = _best_circle(points.part(free[:: -(-len(free) // _MOST_VOTERS)]))
     if best is None:
         return None
-    center, radius = best
+    x, y, radius = best
+    searched = points.part(free)
     for _ in range(2):
-        normals, off, reach = _around(searched, center, radius)
+        normals, off, reach = _around(searched, x, y, radius)
         on = np.abs(off) < reach
         if np.count_nonzero(on) < _FEWEST:
             return None
         # One step of Gauss and Newton towards the least squares of distances, weighted by precision.
-        precision = np.sqrt(searched.weights * on) / reach
-        slopes = np.array([*normals, np.ones(len(off))]) * precision
-        step = np.linalg.lstsq(slopes @ slopes.T, slopes @ (off * precision), rcond=None)[0]
-        center, radius = center + step[:2], radius + float(step[2])
-    return _checked(points, free, center, radius)
+        precision = searched.weights * on / (reach * reach)
+        slopes = np.array([*normals, np.ones(len(off))])
+        weighted = slopes * precision
+        step = cv2.solve(weighted @ slopes.T, (weighted @ off)[:, None], flags=cv2.DECOMP_SVD)[1]
+        right, up, larger = step.ravel().tolist()
+        x, y, radius = x + right, y + up, radius + larger
+    return _checked(points, free, x, y, radius)
 
 
-def _best_circle(points: LinePoints) -> tuple[Floats, float] | None:
-    """Center (2,) [m] and radius [m] of the circle through three points that most of them are on."""
-    centers, radii = _through(points.positions[(_SHARES * len(points)).astype(np.intp)])
-    possible = (radii > _RADII[0]) & (radii < _RADII[1])
-    if not possible.any():
+def _best_circle(points: LinePoints) -> tuple[float, float, float] | None:
+    """Center x and y and radius [m] of the circle through three points that most of them are on."""
+    x, y, radius = _through(points.positions.take((_SHARES * len(points)).astype(np.intp), axis=1))
+    if not len(x):
         return None
-    centers, radii = centers[possible], radii[possible]
-    x, y = points.positions.T.astype(np.float32)[:, :, None] - centers.T.astype(np.float32)[:, None]  # (n, t)
-    off = np.abs(np.sqrt(x * x + y * y) - radii.astype(np.float32))
-    tolerance = 0.04 + 0.6 * points.blur
-    best = int(np.argmax(points.weights @ (2.0 * (off < tolerance[:, None]) - (off < 0.5 * radii))))
-    return centers[best], float(radii[best])
+    # With d, the distance to the center, both tests are products of numbers of circles and of points.
+    px, py = points.positions
+    squares, ones = px * px + py * py, np.ones(len(px))
+    ranges = squares * (1.0 / points.ground.height**2)
+    tolerance = 0.04 + 0.3 * points.ground.across * np.sqrt(ranges + 1.0)
+    circles = np.array([-2.0 * x, -2.0 * y, np.ones(len(x)), x * x + y * y, radius * radius], dtype=np.float32).T
+    seen = np.array([px, py, squares, ones, -ones], dtype=np.float32)
+    seen[2] -= tolerance * tolerance
+    off = circles @ seen  # d^2 - radius^2 - tolerance^2: within 2 radius tolerance of 0 on the circle
+    on = np.abs(off) < np.outer(radius, 2.0 * tolerance).astype(np.float32)
+    seen[2], seen[4] = squares, -1.25
+    circles /= circles[:, 4:]
+    inside = np.abs(circles @ seen) < 1.0  # 0.5 radius < d < 1.5 radius
+    votes = 2.0 * (on.astype(np.float32) @ points.weights) - inside.astype(np.float32) @ points.weights
+    best = int(votes.argmax())
+    return float(x[best]), float(y[best]), float(radius[best])
 
 
-def _through(triples: Floats) -> tuple[Floats, Floats]:
-    """Centers (t, 2) and radii (t,) of circles through three points each (t, 3, 2); NaN for points in a row."""
-    a, b = triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0]
-    area = 2.0 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-    area[np.abs(area) < 1e-6] = np.nan
-    aa, bb = (a**2).sum(axis=1), (b**2).sum(axis=1)
-    x = (b[:, 1] * aa - a[:, 1] * bb) / area
-    y = (a[:, 0] * bb - b[:, 0] * aa) / area
-    return triples[:, 0] + np.array([x, y]).T, np.hypot(x, y)
+def _through(triples: Floats) -> tuple[Floats, Floats, Floats]:
+    """Centers x and y (t,) and radii (t,) of circles through three points each (2, 3, t), of those with possible
+    radii."""
+    first, others = triples[:, 0], triples[:, 1:] - triples[:, :1]
+    (ax, bx), (ay, by) = others
+    aa, bb = (others * others).sum(axis=0)
+    area = 2.0 * (ax * by - ay * bx)
+    area[np.abs(area) < 1e-6] = np.nan  # in a row
+    x, y = (by * aa - ay * bb) / area, (ax * bb - bx * aa) / area
+    radii = np.sqrt(x * x + y * y)
+    possible = ((radii > _RADII[0]) & (radii < _RADII[1])).nonzero()[0]
+    return (x + first[0]).take(possible), (y + first[1]).take(possible), radii.take(possible)
 
 
-def _around(points: LinePoints, center: Floats, radius: float) -> tuple[Floats, Floats, Floats]:
+def _around(points: LinePoints, x: float, y: float, radius: float) -> tuple[Floats, Floats, Floats]:
     """Unit vectors (2, n) from the center of a circle to points, how far they are outside of it (n,) [m], and how far
     they may be (n,) [m]."""
-    places = points.positions.T
-    away = places - center[:, None]
-    lengths = np.maximum(np.hypot(*away), 1e-9)
+    away = points.positions - [[x], [y]]
+    lengths = np.maximum(np.sqrt(away[0] * away[0] + away[1] * away[1]), 1e-9)
     away /= lengths
-    return away, lengths - radius, points.tolerance((places * away).sum(axis=0))
+    outward = points.positions[0] * away[0] + points.positions[1] * away[1]
+    return away, lengths - radius, tolerance(outward, points.leaning, points.ground)
 
 
-def _checked(points: LinePoints, free: Chosen, center: Floats, radius: float) -> CirclePoints | None:
+def _checked(points: LinePoints, free: Chosen, x: float, y: float, radius: float) -> CirclePoints | None:
     """The circle with all its points, or None if it is too small, too large, or too little of it is seen."""
-    (x, y), off, reach = _around(points, center, radius)
+    (right, up), off, reach = _around(points, x, y, radius)
     on = np.abs(off) < reach
     members = np.flatnonzero(on)
     if not _RADII[0] < radius < _RADII[1] or len(members) < _FEWEST:
         return None
-    sectors = np.floor(np.arctan2(y[on], x[on]) * (0.5 * _SECTORS / math.pi)).astype(np.intp) % _SECTORS
-    arc = np.count_nonzero(np.bincount(sectors)) / _SECTORS
+    angles = np.arctan2(up.take(members), right.take(members))
+    arc = len(set(np.floor(angles * (0.5 * _SECTORS / math.pi)).tolist())) / _SECTORS
     weights = points.weights
     total = float(weights[on].sum())
     around = float(weights[np.abs(off) < _AROUND * radius].sum())
     own = float(weights[free[on[free]]].sum())
     if arc < _LEAST_ARC or total < _LEAST_PURE * around or own < _LEAST_OWN * total:
         return None
-    return CirclePoints(center, radius, arc, members)
+    return CirclePoints(np.array([x, y]), radius, arc, members)

@@ -13,16 +13,18 @@ from ..borders.records import SHARE, SIZE, Record, Sent
 
 _PLACE = Sent(3, (2,))
 
+UPRIGHTS = {"goal": "post", "robot": "robot"}
+"""What the uprights of a class are, by its name."""
+
 
 @dataclass(frozen=True, eq=False)
 class Upright(Record):
     """Something that stands on the plane: a goal post, or a robot or another obstacle.
 
-    class_name: post or robot. confidence: calibrated probability of a close look; if the class has none, the
-    probability of a peak; if it has no peaks either, the mean probability of its points; 0 to 1. position (2,) [m]: its
-    base, which is the middle of a post's foot, or the front of a robot's foot, in the direction of its middle. distance
-    [m]: from the camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the
-    base; NaN outside of the picture. width [m]: as seen from the camera.
+    class_name: post or robot. confidence: calibrated probability, 0 to 1. position (2,) [m]: its base: the middle
+    of a post's foot, or the front of a robot's foot, in the direction of its middle. distance [m]: from the
+    camera to the base. bearing (3,): unit vector from the camera to the base. pixel (2,) [px]: of the base; NaN outside
+    of the picture. width [m]: as seen from the camera.
     """
 
     class_name: Annotated[str, Sent(name="class")]
@@ -76,10 +78,10 @@ class CenterCircle(Record):
 class Crossing(Record):
     """Where two field lines meet at a right angle.
 
-    kind: its form. position (2,) [m]: on the plane. heading [rad]: counterclockwise from the x axis; for T the
-    direction of the line that ends there, away from the crossing; for L halfway between its two lines, into the corner;
-    for X the direction of either line, from 0 to a right angle. confidence: product of those of its two lines, and down
-    to half of it if one ends in front of the crossing; 0 to 1.
+    kind: its form. position (2,) [m]: on the plane. heading [rad]: counterclockwise from the x axis; T: along the line
+    that ends there, away from the crossing; L: along the bisector of its right angle; X: along one of its lines,
+    from 0 to a right angle. confidence: product of the confidences of its two lines, and less, down to half, if a line
+    ends before the crossing; 0 to 1.
     """
 
     kind: Annotated[str, Sent(allowed=("L", "T", "X"))]

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from ..arrays import Floats, Singles
 from .border import find_border
 from .circle import CirclePoints, find_circle
-from .crossings import find_crossings
+from .crossings import certain_crossings, possible_crossings
 from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
 from .goals import pair_posts
 from .ground_points import GroundPoints, starts_of_runs
 from .lines import LEAST, LinePoints, Piece, find_pieces, line_points
 from .ridges import Profiles, pieces_on_ridges
-from .uprights import KINDS, POST, ROBOT, Base, UprightRules, find_uprights
 
 ToPixels = Callable[[Floats], Floats]
 """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
@@ -31,63 +30,41 @@ _CELL = 0.1
 
 
 def find_features(
-    points: GroundPoints, to_pixels: ToPixels, profiles: Profiles, bases: Mapping[str, Sequence[Base]]
+    points: GroundPoints,
+    to_pixels: ToPixels,
+    profiles: Profiles,
+    posts: tuple[Upright, ...],
+    robots: tuple[Upright, ...],
 ) -> FieldFeatures:
     """All field features among the points of a frame.
 
-    profiles: brightness of the frame across lines. bases: of the classes that have peaks or a close look, by class.
-    Rules find the uprights of the others.
+    profiles: brightness of the frame across lines. posts, robots: what stands on the plane.
     """
-    found = {
-        name: bases[name] if name in bases else _by_rules(points, name, rules)
-        for name, rules in (("goal", POST), ("robot", ROBOT))
-    }
     near = line_points(points)
-    likely = near.part(np.flatnonzero(near.weights > LEAST))
+    likely = near.part((near.weights > LEAST).nonzero()[0])
     pieces, circle = _straight_and_round(near, likely)
     pieces = pieces_on_ridges(pieces, points, profiles)
-    border = find_border(points) if "field" in points.classes else np.empty((0, 2))
-    feet = {name: np.array([each.position for each in things]).reshape(-1, 2) for name, things in found.items()}
+    confidences = [float(likely.weights.take(each.members).sum()) / len(each.members) for each in pieces]
+    crossings = possible_crossings(pieces, confidences)
+    behind = np.array([each for _, *both in crossings for each in both], dtype=np.complex128)
+    border = find_border(points)
     ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
-    post_pixels, robot_pixels, end_pixels, border_pixels = _all_pixels(
-        to_pixels, feet["goal"], feet["robot"], ends, border
-    )
-    posts = _uprights(found["goal"], KINDS["goal"], points.height, post_pixels)
-    lines = tuple(
-        Segment(piece.ends, pixels, float(likely.weights[piece.members].sum()) / len(piece.members))
-        for piece, pixels in zip(pieces, end_pixels.reshape(-1, 2, 2), strict=True)
-    )
-    thinned, confidences = _thinned(likely)
+    places = np.concatenate([ends, border, behind.view(np.float64).reshape(-1, 2)])
+    pixels = to_pixels(places)  # faster at once
+    shown = np.isfinite(pixels[len(ends) + len(border) :, 0]).reshape(-1, 2).tolist()
+    lines = tuple(map(Segment, ends.reshape(-1, 2, 2), pixels[: len(ends)].reshape(-1, 2, 2), confidences))
+    thinned, likelihoods = _thinned(likely)
     return FieldFeatures(
         posts=posts,
         goals=pair_posts(posts),
-        robots=_uprights(found["robot"], KINDS["robot"], points.height, robot_pixels),
+        robots=robots,
         lines=lines,
         circle=None if circle is None else _circle(circle, likely),
-        crossings=find_crossings(lines, lambda places: np.asarray(np.isfinite(to_pixels(places)).all(axis=1))),
+        crossings=certain_crossings([each for each, *_ in crossings], [one and other for one, other in shown]),
         line_points=thinned,
-        line_confidences=confidences,
-        border=Border(border, border_pixels) if len(border) else None,
+        line_confidences=likelihoods,
+        border=Border(border, pixels[len(ends) : len(ends) + len(border)]) if len(border) else None,
     )
-
-
-def _by_rules(points: GroundPoints, name: str, rules: UprightRules) -> list[Base]:
-    return find_uprights(points, points.classes[name], rules) if name in points.classes else []
-
-
-def _all_pixels(to_pixels: ToPixels, *groups: Floats) -> list[Floats]:
-    """The pixels of groups of places (n, 2) [m]. One call for all costs less than one for each."""
-    return np.split(to_pixels(np.concatenate(groups)), np.cumsum([len(each) for each in groups])[:-1])
-
-
-def _uprights(bases: Sequence[Base], name: str, height: float, pixels: Floats) -> tuple[Upright, ...]:
-    return tuple(_upright(base, name, height, pixel) for base, pixel in zip(bases, pixels, strict=True))
-
-
-def _upright(base: Base, name: str, height: float, pixel: Floats) -> Upright:
-    toward = np.array([*base.position, -height])
-    distance = float(np.linalg.norm(toward))
-    return Upright(name, base.confidence, base.position, distance, toward / distance, pixel, base.width)
 
 
 def _straight_and_round(points: LinePoints, likely: LinePoints) -> tuple[list[Piece], CirclePoints | None]:
@@ -114,9 +91,9 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     """Mean places (p, 2) [m] and probabilities (p,) of the line points in each square."""
     if not len(points):
         return np.empty((0, 2)), np.empty(0, np.float32)
-    cells = np.floor(points.positions * (1.0 / _CELL)) @ (1024.0, 1.0)  # points of a square have the same number
-    order = np.argsort(cells)
-    starts = starts_of_runs(cells[order])
-    columns = np.array([*points.positions.T, points.weights])[:, order]
-    x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
+    cells = np.array([1024.0, 1.0]) @ np.floor(points.positions * (1.0 / _CELL))  # those of a square are the same
+    order = cells.argsort()
+    columns = np.array([*points.positions, points.weights, np.ones(len(points))]).take(order, axis=1)
+    sums = np.add.reduceat(columns, starts_of_runs(cells.take(order)), axis=1)
+    x, y, weights = sums[:3] / sums[3]
     return np.array([x, y]).T, weights.astype(np.float32)

@@ -1,59 +1,97 @@
-"""Mesh points as places on the plane, with the probabilities of the classes of a soccer field."""
+"""Mesh points as places on the plane, with what a network says about a soccer field there."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Chosen, Floats, Singles
+from ..arrays import Chosen, Floats, Indices, Mask, Singles
 
 ROLES = ("goal", "robot", "line", "field")
 """Names of the classes that field features are made of."""
 
+COLUMN = 0.04
+"""Width of a column of points, as seen from above [rad]."""
+
+_LOWEST = 1e-3
+"""Rays less steep than this do not meet the plane near enough to matter."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundMap:
+    """Where rays of a mesh meet the plane. It is the same for all frames with these rays, so it is prepared once.
+
+    All lengths are in heights of the camera over the plane. A point on something that stands on the plane has the
+    place behind it, where its ray would end.
+
+    numbers (k,): of the rays that meet the plane, from near to far. places (2, k): where they do, from below the camera
+    in the frame of the rays. ranges (k,): their distances from there. leaning (k,): see `leaning`.
+    by_column (k,): the same numbers column by column, each from near to far. column_ranges (k,): distances in this
+    order. bounds (c + 1,): positions where the columns begin, and k. directions (c,): of the columns, as complex
+    numbers of length 1; the first one is behind the camera.
+    """
+
+    numbers: Chosen
+    places: Floats
+    ranges: Floats
+    leaning: Singles
+    by_column: Chosen
+    column_ranges: Floats
+    bounds: Chosen
+    directions: npt.NDArray[np.complex128]
+
+
+def ground_map(rays: Floats, numbers: Chosen | Indices) -> GroundMap:
+    """The map of rays (m, 3) that point downward, of those with these numbers."""
+    upward = rays[numbers, 2]
+    order = np.argsort(upward, kind="stable")
+    sorted_numbers = numbers[order[: np.searchsorted(upward[order], -_LOWEST)]].astype(np.intp)
+    x, y, z = rays[sorted_numbers].T
+    places = np.array([x, y]) / -z
+    ranges = np.hypot(*places)
+    column = np.floor((np.arctan2(places[1], places[0]) + np.pi) / COLUMN).astype(np.intp)
+    order = np.argsort(column, kind="stable")
+    count = int(2.0 * np.pi / COLUMN) + 1
+    return GroundMap(
+        sorted_numbers,
+        places,
+        ranges,
+        leaning(ranges).astype(np.float32),
+        sorted_numbers[order],
+        ranges[order],
+        np.searchsorted(column[order], np.arange(count + 1)),
+        np.exp(1j * ((np.arange(count) + 0.5) * COLUMN - np.pi)),
+    )
+
 
 @dataclass(frozen=True, eq=False)
 class GroundPoints:
-    """The n points of a frame below the horizon, from near to far.
+    """The points of a frame on the plane.
 
-    positions (n, 2) [m]: where their rays meet the plane, relative to the point below the camera, in the frame of
-    Detection. A point on something that stands on the plane has the place behind it, where its ray would end. height:
-    of the camera over the plane [m]. across: distance between neighboring points across the ray [m]; the same
-    everywhere. classes: probabilities (n,) of each class of ROLES that the network has. outside: probability (n,) of
-    the classes that are neither the field nor anything on it. ahead (2,): unit vector in the camera's direction.
+    map: where the m rays meet the plane. shown (m,): which rays the frame shows. line (m,): probability of a line
+    there. inside (m,): probability of the field and its lines, minus that of all that is neither the field nor anything
+    on it; None if the network has no class field. height: of the camera over the plane [m]. across: distance between
+    neighboring points across the ray [m]; the same everywhere. heading (2, 2): from the frame of the rays to that of
+    Detection.
     """
 
-    positions: Floats
+    map: GroundMap
+    shown: Mask
+    line: Singles
+    inside: Singles | None
     height: float
     across: float
-    classes: dict[str, Singles]
-    outside: Singles
-    ahead: Floats
+    heading: Floats
 
-    @cached_property
-    def ranges(self) -> Floats:
-        """Distance (n,) [m] on the plane from the point below the camera."""
-        x, y = self.positions.T
-        return np.asarray(np.sqrt(x * x + y * y))
 
-    @cached_property
-    def azimuths(self) -> Floats:
-        """Direction (n,) [rad] on the plane, counterclockwise from `ahead`: -pi and pi are behind the camera."""
-        x, y = self.ahead
-        ahead, left = np.array([[x, y], [-y, x]]) @ self.positions.T
-        return np.asarray(np.arctan2(left.astype(np.float32), ahead.astype(np.float32)), dtype=np.float64)
-
-    def directions(self, azimuths: Floats) -> Floats:
-        """Unit vectors (m, 2) at azimuths (m,) [rad]."""
-        (x, y), c, s = self.ahead, np.cos(azimuths), np.sin(azimuths)
-        return np.array([c * x - s * y, c * y + s * x]).T
-
-    def along(self, ranges: Floats) -> Floats:
-        """Distance [m] to the next ring of points, along the ray, at these ranges [m]."""
-        return np.asarray(np.sqrt(ranges**2 + self.height**2) * (self.across / self.height))
+def leaning(ranges: Floats) -> Floats:
+    """The tangent of half the angle between the vertical and rays to places at these ranges (...) [heights of the
+    camera]: the way to the next ring of points, less that to the next point of the ring, grows with it and the range.
+    """
+    return np.asarray(ranges / (np.sqrt(ranges * ranges + 1.0) + 1.0))
 
 
 def starts_of_runs(numbers: npt.NDArray[np.number[Any]]) -> Chosen:

@@ -7,11 +7,13 @@ the two directions. Lines in these directions are taken one after the other, bes
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Chosen, Floats, Mask, Singles
+from ..arrays import Chosen, Floats, Mask, Number, Singles
 from .ground_points import GroundPoints, starts_of_runs
 
 LEAST = 0.1
@@ -23,7 +25,7 @@ _FARTHEST = 10.0
 _ANGLES = 45
 """Directions that the Hough transform tries, from 0 to a right angle."""
 
-_MOST_VOTERS = 200
+_MOST_VOTERS = 100
 """Largest number of points that choose the direction."""
 
 _BIN = 0.06
@@ -64,65 +66,60 @@ _NOISE = 0.5
 """Standard deviation of a point's distance from its line, as a share of its tolerance."""
 
 
-def tolerance(outward: Floats, blur: Floats, across: float) -> Floats:
-    """How far (...) [m] a point may be from a line's middle.
-
-    outward (...): how much the line's normal points away from the camera, 0 to 1. blur (...), across [m]: as those of
-    LinePoints.
-    """
-    return np.asarray(outward * (0.7 * (blur - across)) + (0.04 + 0.7 * across))
-
-
 @dataclass(frozen=True, eq=False)
 class LinePoints:
-    """n points near enough for lines. positions (n, 2) [m]. weights (n,): their probabilities. ranges (n,) [m]: from
-    below the camera. blur (n,) [m]: half the distance between rings of the mesh there. across [m]: half the distance
-    between points of a ring."""
+    """n points near enough for lines.
+
+    positions (2, n) [m]. weights (n,): probabilities of a line there. leaning (n,): see GroundMap. ground: all points
+    of the frame.
+    """
 
     positions: Floats
     weights: Singles
-    ranges: Floats
-    blur: Floats
-    across: float
+    leaning: Singles
+    ground: GroundPoints
 
     def __len__(self) -> int:
-        return len(self.ranges)
+        return len(self.weights)
 
-    def tolerance(self, offsets: Floats) -> Floats:
-        """How far (..., n) [m] a point may be from a line's middle. offsets (..., n) [m]: how far the points are from
-        the camera along the line's normal."""
-        return tolerance(np.abs(offsets) / self.ranges, self.blur, self.across)
-
-    def part(self, chosen: Chosen | slice) -> LinePoints:
+    def part(self, chosen: Chosen) -> LinePoints:
         """Some of the points."""
         return LinePoints(
-            self.positions[chosen], self.weights[chosen], self.ranges[chosen], self.blur[chosen], self.across
+            self.positions.take(chosen, axis=1), self.weights.take(chosen), self.leaning.take(chosen), self.ground
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A straight piece of a line: its ends (2, 2) [m], the numbers of its likely points, and its support: the sum of
-    what all points on it have above the probability from which a point speaks for a line."""
+def tolerance(offsets: Number, leaning: Number, ground: GroundPoints) -> Number:
+    """How far (...) [m] a point may be from a line's middle: by more than half the way to the next point.
+
+    offsets (...) [m]: how far the points are from the camera along the line's normal. leaning (...): see GroundMap.
+    ground: has the spacing of the points.
+    """
+    half = 0.35 * ground.across
+    return np.abs(offsets) * leaning * (half / ground.height) + (0.04 + half)
+
+
+class Piece(NamedTuple):
+    """A straight piece of a line: its ends (2, 2) [m], its length [m], the numbers of its likely points, and its
+    support: the sum of what all points on it have above the probability from which a point speaks for a line."""
 
     ends: Floats
+    length: float
     members: Chosen
     support: float
 
-    @property
-    def length(self) -> float:
-        """Distance between the ends [m]."""
-        return math.dist(*self.ends.tolist())
-
 
 def line_points(points: GroundPoints) -> LinePoints:
-    """All points near enough for lines, with the probability 0 if the network has no class line."""
-    first, last = np.searchsorted(points.ranges, (1e-3, _FARTHEST))
-    near = slice(int(first), int(last))
-    ranges = points.ranges[near]
-    probabilities = points.classes.get("line", np.zeros(len(points.ranges), np.float32))
+    """All points near enough for lines."""
+    ground, height = points.map, points.height
+    first, end = np.searchsorted(ground.ranges, (1e-3 / height, _FARTHEST / height)).tolist()
+    near = points.shown.take(ground.numbers[first:end]).nonzero()[0]
+    near += first
     return LinePoints(
-        points.positions[near], probabilities[near], ranges, 0.5 * points.along(ranges), 0.5 * points.across
+        (height * points.heading) @ ground.places.take(near, axis=1),  # take is much faster than an index here
+        np.fmax(points.line.take(ground.numbers.take(near)), np.float32(0.0)),  # 0 for NaN
+        ground.leaning.take(near),
+        points,
     )
 
 
@@ -133,16 +130,16 @@ def find_pieces(points: LinePoints, likely: LinePoints) -> list[Piece]:
     """
     if len(likely) < _FEWEST:
         return []
-    normals = _normals(np.array([_main_direction(likely)]))
+    normals = _normals(_main_direction(likely))
     lines = _find_lines(likely, normals)
     pieces = _cut(points, normals, lines) if lines else []
     return sorted(pieces, key=lambda each: -each.length)
 
 
-def _normals(angles: Floats) -> Floats:
-    """Normals (2 a, 2) of lines in both directions of a field: at these angles (a,) [rad], then across."""
+def _normals(angles: Floats | float) -> Floats:
+    """Normals (2, ..., 2) of lines in both directions of a field: at these angles (...) [rad], then across."""
     c, s = np.cos(angles), np.sin(angles)
-    return np.array([[c, s], [-s, c]]).transpose(0, 2, 1).reshape(-1, 2)
+    return np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)])
 
 
 _CENTER = round(_FARTHEST / _STEP)
@@ -150,76 +147,84 @@ _REACH = np.arcsinh(np.arange(-_CENTER, _CENTER + 1) * _STEP)
 _BINS = np.floor((_REACH - _REACH[0]) / _BIN).astype(np.intp) + 1  # bin 0 is empty: it divides the rows
 _COUNT = int(_BINS[-1]) + 1
 _TRIED = np.arange(_ANGLES, dtype=np.float64) * (0.5 * math.pi / _ANGLES)
-_NORMALS = _normals(_TRIED).astype(np.float32)
+_NORMALS = _normals(_TRIED).reshape(-1, 2).astype(np.float32)
 
 
-def _bins(offsets: Floats | Singles) -> Chosen:
-    """Bins (r, n) of lines at these distances (r, n) [m] from the camera: finer for near lines. Each row has its
-    own bins."""
-    steps = (offsets * (1.0 / _STEP) + (_CENTER + 0.5)).astype(np.intp)
-    return np.asarray(_BINS[steps] + _COUNT * np.arange(len(offsets))[:, None])
+def _bins(normals: Number, places: Number) -> Chosen:
+    """Bins (r, n) of lines with normals (r, 2) through places (2, n) [m]: by their distances from the camera, finer for
+    near lines. Each row has its own bins."""
+    steps = (normals * (1.0 / _STEP)) @ places
+    steps += _CENTER + 0.5
+    bins = np.asarray(_BINS.take(steps.astype(np.intp)))
+    bins += np.arange(0, _COUNT * len(normals), _COUNT)[:, None]
+    return bins
 
 
 def _main_direction(points: LinePoints) -> float:
     """The direction [rad], from 0 to a right angle, in which most points share a line, or at a right angle to it."""
-    some = points.part(slice(None, None, -(-len(points) // _MOST_VOTERS)))
-    bins = _bins(_NORMALS @ some.positions.T.astype(np.float32))
-    votes = np.bincount(bins.ravel(), np.tile(some.weights, len(bins)), len(bins) * _COUNT)
-    peaks = (votes.reshape(2, _ANGLES, _COUNT) ** 2).sum(axis=(0, 2))
+    some = slice(None, None, -(-len(points) // _MOST_VOTERS))
+    bins = _bins(_NORMALS, points.positions[:, some].astype(np.float32))
+    weights = np.broadcast_to(points.weights[some].astype(np.float64), bins.shape)
+    votes = np.bincount(bins.ravel(), weights.ravel(), len(bins) * _COUNT).reshape(2, _ANGLES, _COUNT)
+    peaks = np.einsum("aij,aij->i", votes, votes)
     best = int(np.argmax(peaks))
     before, most, after = peaks[[best - 1, best, (best + 1) % _ANGLES]].tolist()
     shift = 0.5 * (after - before) / max(2.0 * most - before - after, 1e-9)  # of the parabola through the three
     return float(_TRIED[best] + shift * _TRIED[1])
 
 
-@dataclass(frozen=True, eq=False)
-class _Line:
-    """A fitted line: the number of its normal, a point [m], its direction, and the numbers of its likely points."""
+_ENDS = np.array([0, 1])
+"""From the numbers of the first and the last to the first and the one behind the last."""
+
+
+class _Line(NamedTuple):
+    """A fitted line: the number of its normal, its direction, its distance to the left of the point below the camera
+    [m], and the numbers of its likely points."""
 
     axis: int
-    middle: tuple[float, float]
-    direction: tuple[float, float]
+    direction: complex
+    distance: float
     members: Chosen
 
 
 def _find_lines(points: LinePoints, normals: Floats) -> list[_Line]:
-    """Lines across two normals (2, 2), each fitted to likely points that no line before has."""
-    offsets = normals @ points.positions.T
-    bins, reach = _bins(offsets), points.tolerance(offsets)
-    moments = np.ones((6, len(points)))  # 1, x, y, x^2, x y and y^2
-    moments[1:3] = points.positions.T
-    moments[3:5], moments[5] = moments[1] * moments[1:3], moments[2] ** 2
-    weights = np.array([points.weights, points.weights], dtype=np.float64)  # 0 where not free
-    precision = weights / reach**2
+    """Lines across two normals (2, 2), each fitted to likely points that no line before has. Those across the first
+    normal are first."""
+    (x, y), count = points.positions, len(points)
+    offsets = normals @ points.positions
+    bins, reach = _bins(normals, points.positions), tolerance(offsets, points.leaning, points.ground)
+    moments = np.array([np.ones(count), x, y, x * x, x * y, y * y])
+    free = np.empty((4, count))  # weights, twice, and precisions; 0 where not free
+    free[:2] = points.weights
+    np.divide(points.weights, reach * reach, out=free[2:])
+    weights, all_bins, expected = free[:2].reshape(-1), bins.reshape(-1), normals.tolist()
     lines: list[_Line] = []
     for _ in range(_MOST_LINES):
-        votes = np.bincount(bins.ravel(), weights.ravel(), 2 * _COUNT)
+        votes = np.bincount(all_bins, weights, 2 * _COUNT)
         votes[:-1] += votes[1:]  # a line may fall between two bins
-        peak = int(np.argmax(votes))
+        peak = int(votes.argmax())
         if votes[peak] < _LEAST_VOTES:
             break
         axis = peak // _COUNT
-        near = (bins[axis] == peak) | (bins[axis] == peak + 1)
-        middle, direction, on = _fit(moments, precision[axis], reach[axis], near, normals[axis])
-        members = np.flatnonzero(on & (weights[0] > 0.0))
+        near = (bins[axis] - peak).view(np.uintp) < 2
+        direction, distance, on = _fit(moments, free[2 + axis], reach[axis], near, expected[axis])
+        members = (on & (weights[:count] > 0.0)).nonzero()[0]
         if len(members) >= _FEWEST:
-            lines.append(_Line(axis, middle, direction, members))
-        left = ~(on | near)
-        weights *= left
-        precision *= left
-    return lines
+            lines.append(_Line(axis, direction, distance, members))
+        free *= ~(on | near)
+    return sorted(lines, key=lambda each: each.axis)
 
 
 def _fit(
-    moments: Floats, precision: Floats, reach: Floats, near: Mask, normal: Floats
-) -> tuple[tuple[float, float], tuple[float, float], Mask]:
-    """A point [m] of a line through points with moments (6, n) and precision (n,), its direction, and which points
-    (n,) are on it.
+    moments: Floats, precision: Floats, reach: Floats, near: Mask, normal: Sequence[float]
+) -> tuple[complex, float, Mask]:
+    """A line through points with moments (6, n) and precision (n,): its direction, its distance to the left of the
+    point below the camera [m], and which points (n,) are on it.
 
     reach (n,): how far a point may be from the line [m]. near (n,): the points to begin with. normal (2,): the expected
     normal.
     """
-    ex, ey, on = -float(normal[1]), float(normal[0]), near  # the expected direction
+    ex, ey, on, places = -normal[1], normal[0], near, moments[:3]  # the expected direction
     for _ in range(2):
         total, sx, sy, sxx, sxy, syy = (moments @ (precision * on)).tolist()
         if total <= 0.0:
@@ -234,27 +239,28 @@ def _fit(
         kept = turn * certainty / (certainty + 1.0 / _ERROR**2)
         c, s = math.cos(kept), math.sin(kept)
         dx, dy = c * ex - s * ey, s * ex + c * ey
-        on = np.abs(np.array([my * dx - mx * dy, dy, -dx]) @ moments[:3]) < reach
-    return (mx, my), (dx, dy), on
+        distance = my * dx - mx * dy
+        on = np.abs(np.array([distance, dy, -dx]) @ places) < reach
+    return complex(dx, dy), distance, on
 
 
-def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]:
-    """The pieces of lines that their points speak for."""
-    middles, directions = np.array([each.middle for each in lines]), np.array([each.direction for each in lines])
-    across = directions[:, ::-1] * (1.0, -1.0)
-    distances = (across * middles).sum(axis=1, keepdims=True)
-    reach = points.tolerance(normals @ points.positions.T)[[each.axis for each in lines]]
-    places = points.positions.T.astype(np.float32)
-    off = across.astype(np.float32) @ places
-    off -= distances.astype(np.float32)
-    on = np.flatnonzero(np.abs(off, out=off) < reach)
-    along = (directions.astype(np.float32) @ places).ravel()[on]  # [m] from the place next to the camera
-    line = on // len(points)
-    order = np.argsort(along + 4.0 * _FARTHEST * line)
+def _cut(points: LinePoints, normals: Floats, lines: Sequence[_Line]) -> list[Piece]:
+    """The pieces of lines that their points speak for. lines: as _find_lines returns them."""
+    count, first = len(points), sum(each.axis == 0 for each in lines)
+    directions, distances = np.array([each[1:3] for each in lines]).T
+    dx, dy = directions.real, directions.imag
+    places = np.ones((3, count), dtype=np.float32)
+    places[:2] = points.positions
+    off = np.abs(np.array([dy, -dx, distances.real], dtype=np.float32).T @ places)
+    along = np.array([dx, dy], dtype=np.float32).T @ places[:2]  # [m] from the place next to the camera
+    reach = tolerance(normals.astype(np.float32) @ places[:2], points.leaning, points.ground)
+    on = np.concatenate([off[:first] < reach[0], off[first:] < reach[1]]).ravel().nonzero()[0]
+    line, along = on // count, along.ravel()[on]
+    order = (along + 4.0 * _FARTHEST * line).argsort()
     line, along = line[order], along[order]
-    point = on[order] - len(points) * line
+    point = on[order] - count * line
     likely = np.flatnonzero(points.weights > LEAST)
-    owner = np.full(len(points), -1)
+    owner = np.full(count, -1)
     for number, each in enumerate(lines):
         owner[likely[each.members]] = number
     own = np.flatnonzero(owner[point] == line)
@@ -262,14 +268,15 @@ def _cut(points: LinePoints, normals: Floats, lines: list[_Line]) -> list[Piece]
     values = points.weights[point].astype(np.float64) - _EXPECTED
     stretches = _best_stretches(values, line, _LEAST_SUPPORT, _MOST_AGAINST)
     spans = np.array([each[:2] for each in stretches], dtype=np.intp).reshape(-1, 2)
-    feet = across * distances
-    ends = feet[line[spans]] + along[spans][..., None] * directions[line[spans]]
-    bounds = np.searchsorted(own, spans + np.array([0, 1])).tolist()
-    pieces = (
-        Piece(its_ends, members[first:end], support)
-        for its_ends, (first, end), (_, _, support) in zip(ends, bounds, stretches, strict=True)
-    )
-    return [each for each in pieces if each.length >= _SHORTEST and len(each.members) > 1]
+    of, reached = line[spans[:, 0]], along[spans].astype(np.float64)
+    ends = ((reached + 1j * distances[of, None]) * directions[of, None]).view(np.float64).reshape(-1, 2, 2)
+    bounds = np.searchsorted(own, spans + _ENDS).tolist()
+    lengths = (reached[:, 1] - reached[:, 0]).tolist()
+    return [
+        Piece(its_ends, length, members[start:end], support)
+        for its_ends, length, (start, end), (_, _, support) in zip(ends, lengths, bounds, stretches, strict=True)
+        if length >= _SHORTEST and end - start > 1
+    ]
 
 
 def _best_stretches(values: Floats, groups: Chosen, least: float, lost: float) -> list[tuple[int, int, float]]:

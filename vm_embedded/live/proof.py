@@ -32,8 +32,7 @@ def prove(model: ModelFile) -> str:
     """
     manifest = model.manifest
     parts: dict[str, Manifest | LookContract] = {"mesh network": manifest}
-    for each in manifest.looks:
-        parts |= {f"{name} at {each.object_class}": part for name, part in zip(each.names, each.chain, strict=True)}
+    parts |= {f"close look at {each.object_class}": each for each in manifest.looks}
     for name, part in parts.items():
         if not part.self_test:
             raise ModelError(f"{model.path}: its {name} has no self-test; export it again")

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..detection.detections import Detections
 from ..detection.detector import Detector
+from ..detection.looking import judge_classes
 from ..detection.objects import locate
 from ..detection.settings import Settings
 from ..detection.stopwatch import Stopwatch
@@ -18,8 +19,8 @@ _WORTH_SHOWING = 0.05
 
 
 def threshold_name(detector: Detector) -> str:
-    """The setting that decides: min_confidence with a close look, threshold without."""
-    return "threshold" if detector.look is None else "min_confidence"
+    """The setting that decides: min_confidence with peaks, threshold without."""
+    return "min_confidence" if detector.manifest.peaks else "threshold"
 
 
 def with_threshold(detector: Detector, text: str) -> Settings:
@@ -40,6 +41,8 @@ def with_settings(detector: Detector, detections: Detections, settings: Settings
     Its network does not run again. Use it in the thread of the detector. Raises ModelError if the close look does not
     run.
     """
-    found, rejected = locate(detections.observation, detector.look, settings, Stopwatch(), explain=True)
+    observation, watch = detections.observation, Stopwatch()
+    judged = judge_classes(observation, detector.looks, settings, watch, explain=True, uprights=False)
+    found, rejected = locate(observation, judged, settings, watch, explain=True)
     near = tuple(each for each in rejected if each.confidence >= _WORTH_SHOWING)
     return replace(detections, objects=found, rejected=near, threshold=settings.threshold)

@@ -33,7 +33,7 @@ class Cap(MeshModel):
     """
 
     neighbors = 6
-    groups = Rings(6).groups
+    mirrored = Rings(6).mirrored
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi = inclinations(shape, height, intersections, max_distance)

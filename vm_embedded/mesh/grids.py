@@ -31,7 +31,7 @@ import numpy.typing as npt
 
 from ..arrays import Chosen, Floats, Indices, Mask, frozen
 from ..geometry.shape import Shape
-from .mesh import SELF, Groups, Mesh, MeshModel, check_size
+from .mesh import Mesh, MeshModel, check_size
 
 STEPS = {
     4: ((-1, 0), (0, 1), (1, 0), (0, -1)),
@@ -68,7 +68,6 @@ class Grid(MeshModel):
         self.kind = kind
         self.neighbors = neighbors
         self.steps = STEPS[neighbors]
-        self.groups = row_groups(self.steps)
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         shape.spacing(height)  # raises GeometryError for a height without a mesh
@@ -113,12 +112,6 @@ class Grid(MeshModel):
         found = np.full((2, rows * halves), np.nan)
         found[:, tried] = x, y
         return found[0].reshape(rows, halves), found[1].reshape(rows, halves)
-
-
-def row_groups(steps: tuple[tuple[int, int], ...]) -> Groups:
-    """`MeshModel.groups` of a lattice: the neighbors in a point's own row, the row above and the row below."""
-    place = {(0, 0): SELF} | {step: number for number, step in enumerate(steps)}
-    return tuple(tuple(place[step] for step in sorted(place) if step[1] == row) for row in (0, 1, -1))
 
 
 def _coordinate(shape: Shape, height: float) -> _Coordinate:

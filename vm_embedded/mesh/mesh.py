@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,37 +17,12 @@ from ..arrays import Floats, Indices, Mask, frozen, one_number
 from ..errors import GeometryError
 from ..geometry.shape import Shape
 
-SELF = -1
-"""Stands for the point itself in `Groups`, where a neighbor is named by its position among the point's neighbors."""
-
-Groups = tuple[tuple[int, ...], ...]
-"""Groups of one to three neighbors, each from left to right, that the layout `runs` puts side by side in memory.
-Each neighbor, and SELF, is in exactly one group. (left, SELF, right) comes first."""
-
 MOST_POINTS = 8_000_000
 """Largest number of points in a mesh: more than the pixels of a camera, and more than OpenCV samples at once."""
 
 
 STRIDE = 1024
 """Rows from one strip of a mesh to the next: the cells of strip s are in the rows from STRIDE s."""
-
-
-class PointGraph(Protocol):
-    """n points with their rays and links: a mesh, or a mesh laid out for a network (network.layout.Layout)."""
-
-    @property
-    def rays(self) -> Floats:
-        """Unit vectors (n, 3) from the camera, in the mesh frame."""
-
-    @property
-    def strips(self) -> Indices | None:
-        """The strip (n,) of each point, -1 for none, in which all points stand for areas of the same size; None for a
-        mesh without strips."""
-
-    def __len__(self) -> int: ...
-
-    def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        """Neighbors (m, N) of the points `members` (m,); n is the off-screen point."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +47,16 @@ class Mesh:
 
     @property
     def strips(self) -> Indices | None:
-        """The strip (n,) of each point; None for a mesh without strips."""
+        """The strip (n,) of each point, in which all points stand for areas of the same size; None for a mesh without
+        strips."""
         return None if self.cells is None else self.cells[:, 1] // np.int32(STRIDE)
 
-    def links(self, members: npt.NDArray[np.integer]) -> Indices:
-        """Neighbors (m, N) of the points `members` (m,)."""
-        return np.take(self.neighbors, members, axis=0)
+    def needed(self, kept: Mask) -> Mask:
+        """The points of a part `kept` (n,) that a network needs: not those of a strip of which it has only margin."""
+        strips = self.strips
+        if strips is None or self.margin is None:
+            return kept
+        return kept & (np.bincount(strips, kept & ~self.margin) > 0.0)[strips]
 
     @property
     def nbytes(self) -> int:
@@ -102,13 +80,14 @@ class Mesh:
 class MeshModel(ABC):
     """A way to place points and to link them.
 
-    neighbors: the number N of neighbors of a point. A network's weights depend on their order. groups: the neighbors
-    that follow each other in memory. steps: (columns, rows) to each neighbor if the points lie on a lattice, else None.
+    neighbors: the number N of neighbors of a point. A network's weights depend on their order. steps: (columns, rows)
+    to each neighbor if the points lie on a lattice, else None. mirrored: without steps, the neighbor (N,) that takes
+    the place of each one in the mirror image.
     """
 
     neighbors: int
-    groups: Groups
     steps: tuple[tuple[int, int], ...] | None = None
+    mirrored: tuple[int, ...] = ()
 
     def build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         """The mesh for objects of this shape, seen from a height [m], out to `max_distance` [m].

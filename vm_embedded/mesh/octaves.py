@@ -21,14 +21,14 @@ import numpy as np
 from ..arrays import Floats, Indices, Mask, frozen
 from ..errors import GeometryError
 from ..geometry.shape import Shape
-from .grids import STEPS, lattice_neighbors, row_groups
+from .grids import STEPS, lattice_neighbors
 from .mesh import STRIDE, Mesh, MeshModel, check_size, rays_from_polar
 from .rings import inclinations
 
 BLOCK, GAP = 8, 2
 """On a canvas, a strip begins at a multiple of BLOCK cells, and has GAP empty cells at its end."""
 
-_ABOVE, _BELOW, _BESIDE = 8, 4, 8
+_ABOVE, _BELOW, _BESIDE = 3, 2, 8
 """Rows of context above and below the rings of an octave, at least, and columns of context where a strip ends behind
 the camera."""
 
@@ -47,7 +47,6 @@ class Octaves(MeshModel):
 
     neighbors = 8
     steps = STEPS[8]
-    groups = row_groups(steps)
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi, columns, strips = _rings_of_strips(shape, height, intersections, max_distance)

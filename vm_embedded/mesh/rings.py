@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Floats, Indices, frozen
 from ..geometry.shape import Shape
-from .mesh import SELF, Mesh, MeshModel, check_size, rays_from_polar
+from .mesh import Mesh, MeshModel, check_size, rays_from_polar
 
 _NEIGHBORS = {
     4: ("left", "top", "right", "bottom"),
@@ -20,14 +20,6 @@ _NEIGHBORS = {
     8: ("left", "top left", "top", "top right", "right", "bottom right", "bottom", "bottom left"),
 }
 """Neighbors in their order. Left and right are in the same ring, top is in the next ring outwards, bottom inwards."""
-
-_GROUPS = {
-    4: (("left", "itself", "right"), ("top",), ("bottom",)),
-    6: (("left", "itself", "right"), ("top left", "top right"), ("bottom left", "bottom right")),
-    8: (("left", "itself", "right"), ("top left", "top right"), ("top",), ("bottom left", "bottom right"), ("bottom",)),
-}
-"""`MeshModel.groups` by name. With eight neighbors, top is the same point as top left or top right, and bottom the same
-as bottom left or bottom right. A run can't hold a point twice, so top and bottom are groups of their own."""
 
 # Subtracted before rounding up, so that float noise above a whole number does not add a point to a ring.
 _CEIL_EPSILON = 1e-9
@@ -43,8 +35,9 @@ class Rings(MeshModel):
 
     def __init__(self, neighbors: int) -> None:
         self.neighbors = neighbors
-        numbers = {"itself": SELF} | {name: number for number, name in enumerate(_NEIGHBORS[neighbors])}
-        self.groups = tuple(tuple(numbers[name] for name in group) for group in _GROUPS[neighbors])
+        names, sides = _NEIGHBORS[neighbors], {"left": "right", "right": "left"}
+        swapped = (" ".join(sides.get(word, word) for word in name.split()) for name in names)
+        self.mirrored = tuple(map(names.index, swapped))
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         phi = inclinations(shape, height, intersections, max_distance)

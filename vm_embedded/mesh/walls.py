@@ -19,7 +19,7 @@ from ..arrays import Floats, Indices, frozen
 from ..errors import GeometryError
 from ..geometry.cylinder import Cylinder
 from ..geometry.shape import Shape
-from .grids import STEPS, row_groups
+from .grids import STEPS
 from .mesh import Mesh, MeshModel, check_size, rays_from_polar
 
 NEAREST = 0.3
@@ -33,7 +33,7 @@ class Walls(MeshModel):
     """
 
     neighbors = 6
-    groups = row_groups(STEPS[neighbors])
+    mirrored = tuple(STEPS[6].index((-column - row, row)) for column, row in STEPS[6])
 
     def _build(self, shape: Shape, height: float, intersections: float, max_distance: float) -> Mesh:
         tall = _checked(shape, height).object_height

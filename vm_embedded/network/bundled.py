@@ -7,8 +7,8 @@ from pathlib import Path
 from ..errors import InputError, unknown
 from ..files import exists
 
-SHIPPED = ("ball", "ball-small", "soccer")
-"""Their names. `ball-small` is for the slowest machines; `soccer` also finds the features of a field."""
+SHIPPED = ("ball", "soccer")
+"""Their names. `soccer` also finds the features of a field."""
 
 DEFAULT = "ball"
 """The network to use if none is named."""

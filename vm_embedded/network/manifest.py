@@ -18,11 +18,11 @@ from ..geometry.shape import Shape
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
+from .example import SelfTest
 from .look_contract import LookContract, check_provenance
-from .self_test import SelfTest
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 7
+FORMAT_VERSION = 8
 
 KINDS = ("object", "upright", "area", "background")
 """Kinds of classes. object: has the mesh's shape; the runtime locates it. upright, area: the runtime reports its points
@@ -30,10 +30,6 @@ with bearings. background: everything else."""
 
 EDGES = ("hard", "same")
 """Replacement of a missing neighbor. hard: the off-screen point, whose input is -1. same: the point itself."""
-
-LAYOUTS = ("plain", "runs", "canvas")
-"""Order of the points in the network's input; see layout.py. plain: point by point. runs: slots, ring by ring. canvas:
-the strips of mesh octaves on a picture."""
 
 POINT_SAMPLINGS = ("bilinear", "footprint")
 """Color of a point. bilinear: at its pixel, from the four around it. footprint: the mean of the area that it stands
@@ -95,16 +91,14 @@ class Manifest:
     object_height: of a cylinder [m], else 0.
     any_radius: the network was trained on objects of many radii, so the mesh is made for the real one's.
     self_test: an example with its answer, which each loading of the model file runs.
-    layout: one of LAYOUTS; all but plain need edge hard, and canvas mesh octaves.
     operations: multiplications and additions for each point.
     channels: their order in a point's input, which is the point's color times `scale`.
     scale: see `channels`.
     sampling: one of POINT_SAMPLINGS.
     colors: one of POINT_COLORS.
-    look: description of the look network, if the file has one; see close_look.py.
-    upright_looks: descriptions of the look networks for classes of kind upright.
-    peaks: names of classes of kind object or upright, for which the network also says where objects are; only in
-        layout canvas. After the probabilities of all classes, each of them has four outputs for each cell: the score, a
+    looks: descriptions of the look networks for classes with peaks; see close_look.py.
+    peaks: names of classes of kind object or upright, for which the network also says where objects are; only on mesh
+        octaves. After the probabilities of all classes, each of them has four outputs for each cell: the score, a
         logit of whether the place of an object is in the cell; the shift to the right and up from the cell to this
         place [cells]; and the natural logarithm of the object's width over the diameter of the object that the mesh is
         made for. The place is the center of an object, or the base of an upright.
@@ -124,14 +118,12 @@ class Manifest:
     object_height: float = 0.0
     any_radius: bool = False
     self_test: SelfTest | None = None
-    layout: str = "plain"
     operations: int = 0
     channels: str = "rgb"
     scale: float = 1.0 / 255.0
     sampling: str = "bilinear"
     colors: str = "absolute"
-    look: LookContract | None = None
-    upright_looks: tuple[LookContract, ...] = ()
+    looks: tuple[LookContract, ...] = ()
     peaks: tuple[str, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
 
@@ -140,7 +132,6 @@ class Manifest:
             "shape": tuple(SHAPES),
             "mesh": tuple(MESH_MODELS),
             "edge": EDGES,
-            "layout": LAYOUTS,
             "channels": ("rgb",),
             "sampling": POINT_SAMPLINGS,
             "colors": POINT_COLORS,
@@ -148,12 +139,8 @@ class Manifest:
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 raise ModelError(unknown(f"{name} in the model's manifest", getattr(self, name), allowed))
-        if self.layout != "plain" and self.edge != "hard":
-            raise ModelError(f"layout {self.layout} needs edge hard; edge {self.edge} needs layout plain")
-        if (self.layout == "canvas") != (self.mesh == "octaves"):
-            raise ModelError(
-                f"mesh octaves and layout canvas need each other; the mesh is {self.mesh}, the layout {self.layout}"
-            )
+        if self.on_canvas and self.edge != "hard":
+            raise ModelError(f"mesh {self.mesh} needs edge hard, not {self.edge}")
         for name in ("radius", "object_radius", "intersections", "max_distance", "scale"):
             value = getattr(self, name)
             if not _is_number(value) or not 0 < value <= _LARGEST:
@@ -184,8 +171,8 @@ class Manifest:
                 raise ModelError(unknown("class of kind object or upright in the manifest's peaks", each, able))
         if len(set(self.peaks)) != len(self.peaks):
             raise ModelError(f"peaks in the model's manifest must be different classes, not {list(self.peaks)}")
-        if self.peaks and self.layout != "canvas":
-            raise ModelError(f"peaks need layout canvas, not {self.layout}")
+        if self.peaks and not self.on_canvas:
+            raise ModelError(f"peaks need mesh octaves, not {self.mesh}")
 
     def _check_object_height(self) -> None:
         tall = self.object_height
@@ -196,35 +183,18 @@ class Manifest:
                 f"object_height must be above 0 for a cylinder and 0 for other shapes; {self.shape} has {tall:g} m"
             )
 
-    @property
-    def looks(self) -> tuple[LookContract, ...]:
-        """The descriptions of all look networks: at objects, then at uprights."""
-        return self.upright_looks if self.look is None else (self.look, *self.upright_looks)
-
     def _check_looks(self) -> None:
-        objects = [each.name for each in self.classes if each.kind == "object"]
-        if self.look is not None and self.look.object_class not in objects:
-            raise ModelError(
-                f"the close look judges class {self.look.object_class!r}, but the classes of kind object are {objects}"
-            )
-        if self.look is not None and self.look.upright_radius:
-            raise ModelError(
-                f"the close look at objects has an upright_radius of {self.look.upright_radius:g} m; it must be 0"
-            )
+        judged = [each.object_class for each in self.looks]
+        if len(set(judged)) != len(judged) or not set(judged) <= set(self.peaks):
+            raise ModelError(f"there are close looks at {judged}, but the network has peaks for {list(self.peaks)}")
+        kinds = {each.name: each.kind for each in self.classes}
         for each in self.looks:
-            if each.mesh_weight and each.object_class not in self.peaks:
+            if kinds[each.object_class] == "object" and each.upright_radius:
                 raise ModelError(
-                    f"the close look at {each.object_class!r} has a mesh_weight of {each.mesh_weight:g}, but the "
-                    f"network has peaks only for {list(self.peaks)}; without peaks it must be 0"
+                    f"the close look at {each.object_class!r} has an upright_radius of {each.upright_radius:g} m; for "
+                    "a class of kind object it must be 0"
                 )
-        uprights = [each.name for each in self.classes if each.kind == "upright"]
-        judged = [each.object_class for each in self.upright_looks]
-        if len(set(judged)) != len(judged) or not set(judged) <= set(uprights):
-            raise ModelError(
-                f"there are close looks at the uprights {judged}, but the classes of kind upright are {uprights}"
-            )
-        for each in self.upright_looks:
-            if each.upright_radius < _SMALLEST_CIRCLE:
+            if kinds[each.object_class] == "upright" and each.upright_radius < _SMALLEST_CIRCLE:
                 raise ModelError(
                     f"the close look at {each.object_class!r} must have an upright_radius of at least "
                     f"{_SMALLEST_CIRCLE} m, not {each.upright_radius:g} m"
@@ -278,6 +248,16 @@ class Manifest:
         """The mesh model, which places and links the points."""
         return MESH_MODELS[self.mesh]
 
+    @property
+    def searched_class(self) -> str | None:
+        """The class of the close look at objects, which also finds them in frames without lens and pose."""
+        return next((each.object_class for each in self.looks if not each.upright_radius), None)
+
+    @property
+    def on_canvas(self) -> bool:
+        """Whether the network takes strips on a picture, as mesh octaves has them, and not a graph."""
+        return self.mesh == "octaves"
+
     @cached_property
     def mesh_shape(self) -> Shape:
         """The shape that the mesh is made for."""
@@ -294,12 +274,9 @@ class Manifest:
 
     def as_json(self) -> str:
         """The manifest as the model file holds it."""
-        data = asdict(replace(self, look=None, upright_looks=())) | {"format_version": FORMAT_VERSION}
-        data["look"] = self.look.as_dict() if self.look else None
-        data["upright_looks"] = [each.as_dict() for each in self.upright_looks]
+        data = asdict(replace(self, looks=())) | {"format_version": FORMAT_VERSION}
+        data["looks"] = [each.as_dict() for each in self.looks]
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
-        if not self.peaks:
-            del data["peaks"]
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
     @classmethod
@@ -321,7 +298,6 @@ class Manifest:
         for key in data:
             if key not in known:
                 raise ModelError(unknown("entry in the model's manifest", key, known))
-        data.setdefault("peaks", [])  # of a network without any
         missing = [name for name in known if name not in data]
         if missing:
             raise ModelError(f"the model's manifest lacks {', '.join(missing)}")
@@ -330,13 +306,10 @@ class Manifest:
             data["provenance"] = {str(key): str(value) for key, value in data["provenance"].items()}
         except (TypeError, KeyError, AttributeError) as error:
             raise ModelError(f"the model's manifest has malformed classes or provenance: {error}") from error
-        if data["look"] is not None:
-            data["look"] = LookContract.from_dict(data["look"])
-        if not isinstance(data["upright_looks"], list):
-            raise ModelError(f"upright_looks in the model's manifest must be a list, not {data['upright_looks']!r}")
-        data["upright_looks"] = tuple(map(LookContract.from_dict, data["upright_looks"]))
-        if not isinstance(data["peaks"], list):
-            raise ModelError(f"peaks in the model's manifest must be a list, not {data['peaks']!r}")
+        for name in ("looks", "peaks"):
+            if not isinstance(data[name], list):
+                raise ModelError(f"{name} in the model's manifest must be a list, not {data[name]!r}")
+        data["looks"] = tuple(map(LookContract.from_dict, data["looks"]))
         data["peaks"] = tuple(data["peaks"])
         if data["self_test"] is not None:
             data["self_test"] = SelfTest.from_dict(data["self_test"])

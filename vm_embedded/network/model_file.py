@@ -11,13 +11,12 @@ import base64
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from ..errors import ModelError
 from ..files import read_regular
 from .canary import CANARY_KEY, Canary
-from .look_contract import GLANCE_KEY, LOOK_KEY, LookContract
+from .look_contract import look_key
 from .manifest import METADATA_KEY, Manifest
 
 # Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
@@ -47,10 +46,6 @@ _ZIP = b"PK\x03\x04"
 
 _METADATA_PROPS = 14
 _EXTERNAL_DATA, _DATA_LOCATION = 13, 14
-_OP_TYPE = 4
-_LOOK_UPS = (b"ArrayFeatureExtractor", b"Gather")
-"""Operators that look up neighbors, in the layouts plain and runs."""
-
 _LARGEST = 64 * 2**20
 """Largest model file [bytes]; the networks of the package have less than 2 MiB."""
 
@@ -61,30 +56,17 @@ _Budget = Iterator[int]
 """Gives one number for each field that may still follow."""
 
 
-LookFiles = tuple[bytes, ...]
-"""The ONNX files of a close look's chain: of the look network, of its glance, and of the glance's glance."""
-
-
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file's bytes, its manifest, and the SHA-256 of the bytes. If it has them: the files of its close look at
-    objects and of those at uprights, in the manifest's order, and its canary."""
+    """A model file's bytes, its manifest, and the SHA-256 of the bytes. looks: the ONNX files of its close looks, in
+    the manifest's order. canary: None if it has none."""
 
     path: Path
     content: bytes
     manifest: Manifest
     sha256: str
-    look: LookFiles | None = None
-    upright_looks: tuple[LookFiles, ...] = ()
+    looks: tuple[bytes, ...] = ()
     canary: Canary | None = None
-
-    @cached_property
-    def depth(self) -> int:
-        """How many links away a point may be on which an answer depends: the number of the network's convolutions.
-
-        Only for the layouts plain and runs.
-        """
-        return _look_ups(memoryview(self.content))
 
 
 def read_model(path: str | Path) -> ModelFile:
@@ -115,8 +97,7 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
         manifest = Manifest.from_json(metadata[METADATA_KEY])
-        look = None if manifest.look is None else _look_files(metadata, manifest.look)
-        upright_looks = tuple(_look_files(metadata, each) for each in manifest.upright_looks)
+        looks = tuple(_look_file(metadata, each.object_class) for each in manifest.looks)
         _refuse_unknown_looks(metadata, manifest)
         canary = Canary.from_json(metadata[CANARY_KEY]) if CANARY_KEY in metadata else None
         if SEAL_KEY not in metadata:
@@ -126,41 +107,28 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
     sha256 = hashlib.sha256(content).hexdigest()
-    return ModelFile(Path(path), content, manifest, sha256, look, upright_looks, canary)
+    return ModelFile(Path(path), content, manifest, sha256, looks, canary)
 
 
-def _look_files(metadata: dict[str, str], contract: LookContract) -> LookFiles:
-    """The files of the chain of a look network with this contract. Raises ModelError."""
-    return tuple(_inner_file(metadata, key) for key in contract.keys)
-
-
-def _inner_file(metadata: dict[str, str], key: str) -> bytes:
-    """The ONNX file under a key. Raises ModelError."""
+def _look_file(metadata: dict[str, str], name: str) -> bytes:
+    """The ONNX file of the close look at a class. Raises ModelError."""
+    key = look_key(name)
     if key not in metadata:
-        raise ModelError(f"its manifest has {_in_words(key)}, its metadata has none")
+        raise ModelError(f"its manifest has a close look at {name}, its metadata has none")
     try:
         content = base64.b64decode(metadata[key], validate=True)
         _read_fields(content)
     except (ModelError, ValueError) as error:
-        raise ModelError(f"{_in_words(key)} can't be read: {error}") from error
+        raise ModelError(f"a close look at {name} can't be read: {error}") from error
     return content
 
 
 def _refuse_unknown_looks(metadata: dict[str, str], manifest: Manifest) -> None:
     """Raises ModelError if there are files of looks that the manifest does not describe."""
-    known = {key for each in manifest.looks for key in each.keys}
+    known = {look_key(each.object_class) for each in manifest.looks}
     for key in metadata:
-        if key.startswith((LOOK_KEY, GLANCE_KEY)) and key not in known:
-            raise ModelError(f"its metadata has {_in_words(key)}, its manifest has none")
-
-
-def _in_words(key: str) -> str:
-    """What is under a key of a look's file."""
-    for start, name in ((LOOK_KEY, "a close look"), (GLANCE_KEY, "a glance")):
-        if key.startswith(start):
-            what = key.removeprefix(start).lstrip("2").lstrip("_")
-            return f"{name} at {what}" if what else name
-    return key
+        if key.startswith(look_key("")) and key not in known:
+            raise ModelError(f"its metadata has {key}, its manifest has no such close look")
 
 
 def sealed(content: bytes) -> bytes:
@@ -199,19 +167,6 @@ def _read_fields(content: bytes) -> tuple[dict[str, str], str]:
         raise ModelError("not an ONNX file")
     _refuse_parts("Model", memoryview(content), budget)
     return metadata, digest.hexdigest()
-
-
-def _look_ups(content: memoryview) -> int:
-    """The look-ups of neighbors in an ONNX file that `_read_fields` accepts: one for each convolution."""
-    budget: _Budget = iter(range(_MOST_FIELDS))
-    return sum(
-        node_field == _OP_TYPE and isinstance(kind, memoryview) and bytes(kind) in _LOOK_UPS
-        for number, graph in _fields(content, budget)
-        if number == 7 and isinstance(graph, memoryview)
-        for graph_field, node in _fields(graph, budget)
-        if graph_field == 1 and isinstance(node, memoryview)
-        for node_field, kind in _fields(node, budget)
-    )
 
 
 def _refuse_parts(message: str, data: memoryview, budget: _Budget) -> None:

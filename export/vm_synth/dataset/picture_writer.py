@@ -20,14 +20,14 @@ from vm_embedded.geometry.lens_files import format_lens_file
 from vm_workstation.outlines import polygon_area, sphere_outline
 
 from ..render.image_processing import encode_jpeg, process_image
-from ..render.picture import UNLABELED, Picture
+from ..render.picture import UNLABELED, Render
 from ..scene.configuration import CLASSES
 from ..scene.scene import PlacedBall, Scene
 from ..scene.standing import standing_objects
 from .files import CLASS_COLORS, file_of
 
 
-def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture: Picture) -> None:
+def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture: Render) -> None:
     """Write all files of a picture atomically, scene*.json last. Raises InputError if that fails."""
     image = process_image(picture.radiance, scene.sensor)
     contents = {
@@ -41,7 +41,7 @@ def write_picture(folder: Path, index: int, map_name: str, scene: Scene, picture
         write_file(file_of(folder, part, index), content)
 
 
-def mask_colors(picture: Picture) -> Image:
+def mask_colors(picture: Render) -> Image:
     """The classes as BGRA colors (h, w, 4); unlabeled pixels are transparent."""
     table = np.zeros((256, 4), dtype=np.uint8)
     for number, name in enumerate(CLASSES):
@@ -54,7 +54,7 @@ def _png(image: Image) -> bytes:
     return cv2.imencode(".png", image, [cv2.IMWRITE_PNG_COMPRESSION, 6])[1].tobytes()
 
 
-def scene_description(index: int, map_name: str, scene: Scene, picture: Picture) -> dict[str, Any]:
+def scene_description(index: int, map_name: str, scene: Scene, picture: Render) -> dict[str, Any]:
     """The content of scene*.json: lengths [m], angles [rad], pixels [px].
 
     The origin of the world frame is on the plane below the camera.
@@ -88,7 +88,7 @@ def _ball_position(ball: PlacedBall) -> dict[str, Any]:
     }
 
 
-def _ball_description(scene: Scene, ball: PlacedBall, picture: Picture) -> dict[str, Any]:
+def _ball_description(scene: Scene, ball: PlacedBall, picture: Render) -> dict[str, Any]:
     pixels = sphere_outline(scene.lens, scene.orientation, ball.center, ball.radius, scene.size, unseen=True)
     toward = (ball.center - scene.camera) @ scene.orientation.rotation
     center = scene.lens.project((toward / np.linalg.norm(toward))[None], scene.size)[0]
@@ -108,7 +108,7 @@ def _ground(scene: Scene) -> str:
     return "photographed" if scene.field is None else "field"
 
 
-def _object_descriptions(scene: Scene, picture: Picture) -> dict[str, Any]:
+def _object_descriptions(scene: Scene, picture: Render) -> dict[str, Any]:
     """The entries of objects that are not the ball; none if the object to detect is the ball."""
     if scene.surface is None:
         return {}

@@ -14,14 +14,14 @@ NAME = "train.toml"
 
 
 def write_training(folder: Path, configuration: SceneConfiguration) -> None:
-    """Write the sections [classes] and [mesh] for a set of these objects, unless the folder has the file already."""
+    """Write the file for a set of these objects, unless the folder has it already."""
     path = folder / NAME
     if not path.exists():
         write_file(path, training_text(configuration))
 
 
 def training_text(configuration: SceneConfiguration) -> str:
-    """The sections [classes] and [mesh] as TOML."""
+    """The sections that these objects need, as TOML."""
     own = configuration.object
     radius, height = (sum(each) / 2.0 for each in (own.radius, own.height))
     # The ray through the center of the farthest object, from the lowest camera, meets the plane behind the object.
@@ -29,7 +29,7 @@ def training_text(configuration: SceneConfiguration) -> str:
     farthest = own.distance[1] * low / (low - own.height[1] / 2.0) + own.radius[1]
     found, *others = (list(color) for color in CLASS_COLORS.values())
     return f"""\
-# For vm-train, written by vm-synth: the classes in the masks of this folder, and the mesh for its objects.
+# For vm-train, written by vm-synth: the classes in the masks of this folder, and a network for its objects.
 
 [classes]
 {toml_key(own.name)} = {{ kind = "object", colors = [{found}] }}
@@ -40,4 +40,12 @@ shape = "cylinder"
 radius = {radius:.6g}
 object_height = {height:.6g}
 max_distance = {max(1.02 * farthest, 0.2):.3g}
+model = "octaves"
+
+[network]
+depth = 2
+width = 16
+
+[training]
+optimizer = "muon"
 """

@@ -37,7 +37,7 @@ _SHADOW_STEP = 2  # pixels between traced shadows
 
 
 @dataclass(frozen=True)
-class Picture:
+class Render:
     """A rendered scene.
 
     radiance: linear RGB (h, w, 3), 0 outside of the lens's field of view. classes: position in CLASSES of each pixel
@@ -51,7 +51,7 @@ class Picture:
     areas: tuple[float, ...] = ()
 
 
-def render(scene: Scene, environment: Environment, tracer: Tracer, ground: GroundRanges) -> Picture:
+def render(scene: Scene, environment: Environment, tracer: Tracer, ground: GroundRanges) -> Render:
     """Render a scene. The same scene gives the same picture."""
     random = np.random.default_rng(scene.seed)
     tracer.load_scene(scene, environment)
@@ -66,7 +66,7 @@ def render(scene: Scene, environment: Environment, tracer: Tracer, ground: Groun
     classes = foreground.classes_over(classes)
     radiance[~seen] = 0.0
     classes[~seen] = UNLABELED
-    return Picture(radiance, classes, foreground.coverage, foreground.areas)
+    return Render(radiance, classes, foreground.coverage, foreground.areas)
 
 
 def _background(

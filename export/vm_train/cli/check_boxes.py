@@ -112,9 +112,10 @@ def _unlabeled(found: BoxedSet, network: Path, is_round: bool) -> list[FoundBox]
 
     if network.suffix.lower() != ".onnx":
         return []
-    look = CloseLook.of(read_model(network))
-    if look is None:
+    model = read_model(network)
+    if (name := model.manifest.searched_class) is None:
         return []
+    look = CloseLook.of(model)[name]
     bar = ProgressBar(len(found.pictures), "vm-train")
     try:
         sightings = list(clear_sightings(look, found.pictures, is_round, bar.advance))

@@ -116,12 +116,7 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
             "max_distance": manifest.max_distance,
             "grid": grid.kind + (f", equal at {grid.equal_at:g} m" if grid.equal_at else ""),
             **{f"provenance {key}": value for key, value in manifest.provenance.items()},
-            **_about_look(manifest.look),
-            **{
-                f"{key} at {each.object_class}": value
-                for each in manifest.upright_looks
-                for key, value in _about_look(each).items()
-            },
+            **{key: value for each in manifest.looks for key, value in _about_look(each).items()},
         },
         "data": {
             "folders": [str(each) for each in options.data],
@@ -134,15 +129,13 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
     }
 
 
-def _about_look(look: LookContract | None) -> dict[str, Any]:
-    """The close look of a model, for scores.json."""
-    if look is None:
-        return {"close_look": None}
+def _about_look(look: LookContract) -> dict[str, Any]:
+    """A close look of a model, for scores.json."""
+    name = f"close look at {look.object_class}"
     return {
-        "close_look": f"{look.object_class}, {look.size} x {look.size} samples, extent {look.extent:g} radii, points "
-        f"above {look.above:g}, {look.passes} pass{'es' * (look.passes != 1)}",
-        "close_look_channels": list(look.channels),
-        **{f"close_look provenance {key}": value for key, value in look.provenance.items()},
+        name: f"{look.size} x {look.size} samples, extent {look.extent:g} radii, at most {look.max_proposals} peaks",
+        f"{name}, channels": list(look.channels),
+        **{f"{name}, provenance {key}": value for key, value in look.provenance.items()},
     }
 
 

@@ -38,7 +38,7 @@ def run_boxes(options: argparse.Namespace) -> int:
     settings = detector_settings(options)
     given = [*options.models, *(each for each in options.names if "=" not in each)]
     if not given:
-        raise InputError("give one network or several: model files (.onnx), or ball, ball-small or soccer")
+        raise InputError("give one network or several: model files (.onnx), or ball or soccer")
     models = {name: read_model(model_path(name)) for name in given}
     classes = {judged_class(each.manifest, name): each.manifest for name, each in models.items()}
     if len(classes) > 1:
@@ -53,7 +53,7 @@ def run_boxes(options: argparse.Namespace) -> int:
     frames = _chosen(found.pictures, options.boxes, options.list, options.part)
     posed = sum(_has_pose(each) for each in frames)
     search = None if posed == len(frames) else Search.of(found.pictures, name, is_round(manifest))
-    bare = next((each for each, model in models.items() if model.manifest.look is None), None)
+    bare = next((each for each, model in models.items() if model.manifest.searched_class is None), None)
     if search is not None and bare is not None:
         raise InputError(f"{bare} has no close look, so it needs lens and pose of each frame")
     if search is None and settings.object_radius is None and (radius := _radius_of(frames)):
@@ -118,8 +118,8 @@ def _notes(options: argparse.Namespace, models: dict[str, ModelFile], posed: int
         notes.append(f"Only {posed} of the {count} frames have a lens file with a pose, so no frame used it.")
     folder = printable(options.boxes.resolve().name)
     for name, model in models.items():
-        look = model.manifest.look
-        if options.list is None and look is not None and look.provenance.get("fine_tuned_on") == folder:
+        learned = any(each.provenance.get("fine_tuned_on") == folder for each in model.manifest.looks)
+        if options.list is None and learned:
             notes.append(
                 f"{name} learned from frames of a folder {folder}. The pictures.json of its fine-tuning, given with "
                 "--list, leaves them out."

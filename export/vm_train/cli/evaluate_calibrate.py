@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.cli.program import EXIT_OK
 from vm_embedded.detection.settings import Settings
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, ModelError
 from vm_embedded.files import check_writable
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
@@ -20,13 +20,13 @@ from vm_embedded.network.model_file import read_model
 from .evaluating import evaluate_with_progress, other_radii
 
 if TYPE_CHECKING:
-    from vm_embedded.arrays import Floats, Mask
     from vm_export.look_checkpoint import LookCheckpoint
 
     from ..data.picture_files import PictureFiles
     from ..evaluation.evaluation import Evaluation
     from ..evaluation.workers import Job
     from ..scores.calibration import Calibration
+    from ..scores.object_ranking import Ranking
 
 _FEWEST = 10
 """Right and wrong answers that a calibration needs, of each."""
@@ -44,12 +44,12 @@ _MESH_WEIGHTS = (0.0, 0.2, 0.4, 0.6, 0.8)
 def run_calibrate(options: argparse.Namespace) -> int:
     """Find objects in the pictures, fit the confidence, write the model file, and return the exit status.
 
-    Raises InputError for too few answers and for what can't be read or written, and ModelError for a file without a
-    close look.
+    Raises InputError for too few answers and for what can't be read or written, and ModelError for a file without
+    peaks.
     """
     # Imported here: without torch, help works and the error is one clear line.
     from vm_export.change_model import change_confidence, lost_canary_message
-    from vm_export.look_weights import look_of, upright_looks_of
+    from vm_export.look_weights import looks_of
 
     from ..evaluation.evaluation import Rules
     from ..evaluation.mask_colors import classes_with_colors, default_colors
@@ -61,67 +61,59 @@ def run_calibrate(options: argparse.Namespace) -> int:
         raise InputError(f"{options.output} must end in .onnx: it becomes a model file")
     check_writable(options.output, (path, options.list))
     model = read_model(path)
-    looks, manifest = upright_looks_of(model), model.manifest
-    if model.look is not None or not (looks or manifest.peaks):
-        looks.insert(0, look_of(model))
-    judged = [each.contract.object_class for each in looks]
+    if not model.manifest.peaks:
+        raise ModelError(f"{path} has no peaks: only their confidence, and that of close looks, can be calibrated")
     pictures = select_pictures(options.data, options.list, options.part)
     classes = classes_with_colors(model.manifest, default_colors(path, options.list), options.color)
     rules = Rules(options.radius_of, options.strict)
     job = Job(path, _CANDIDATES, False, classes, rules)
-    if model.look is not None and judged[0] in manifest.peaks:
-        looks[0], result = _weighted(looks[0], job, pictures, options.workers)
-    else:
-        result = evaluate_with_progress(job, job.subject(), pictures, options.workers)
+    tries = _tries(looks_of(model), job, pictures, options.workers)
     if options.radius_of == "all":
-        for note in other_radii(result, model.manifest.object_radius):
+        for note in other_radii(tries[0][1], model.manifest.object_radius):
             print(f"vm-evaluate: {note}", file=sys.stderr)
-    calibrated = []
-    for look in looks:
-        fitted, source = _calibration(look.contract.object_class, result)
-        calibrated.append(look.recalibrated(fitted.scale, fitted.offset, source))
-    scores = {}
-    for name in manifest.peaks:
-        if name not in judged:
-            fitted, _ = _calibration(name, result)
+    looks, scores = [], {}
+    for name in model.manifest.peaks:
+        precisions = [_ranking(result, name).precision_recall.average_precision for _, result in tries]
+        by_class, result = tries[precisions.index(max(precisions)) if name in tries[0][0] else 0]
+        fitted, source = _calibration(name, result)
+        if name in by_class:
+            looks.append(by_class[name].recalibrated(fitted.scale, fitted.offset, source))
+            for weight, precision in zip(_MESH_WEIGHTS, precisions, strict=True):
+                print(f"{name}: average precision {precision:.4f} with a mesh weight of {weight:g}")
+        else:
             scores[name] = fitted.scale, fitted.offset
-    lost_canary = change_confidence(path, options.output, calibrated, scores)
+    lost_canary = change_confidence(path, options.output, looks, scores)
     print(f"{options.output}: written; other objects may now pass --min-confidence")
     if lost_canary:
         print(f"vm-evaluate: {lost_canary_message(options.output, options.model)}", file=sys.stderr)
     return EXIT_OK
 
 
-def _answers(result: Evaluation, name: str) -> tuple[Floats, Mask]:
-    """Confidences (n,) of what was found of a class, and whether each is right (n,)."""
+def _ranking(result: Evaluation, name: str) -> Ranking:
+    """What was found of a class."""
     if name in result.objects:
-        ranking = result.objects[name].ranking(_OVERLAP)
-        return ranking.confidence, ranking.right
+        return result.objects[name].ranking(_OVERLAP)
     if result.features is None:
         raise InputError(f"{name} needs pictures with the classes of a field to be calibrated")
-    scores = result.features.posts if name == "goal" else result.features.robots
-    return scores.judged()
+    return (result.features.posts if name == "goal" else result.features.robots).ranking()
 
 
-def _weighted(
-    look: LookCheckpoint, job: Job, pictures: Sequence[PictureFiles], workers: int | None
-) -> tuple[LookCheckpoint, Evaluation]:
-    """The look network with the weight of the peaks' scores that ranks its objects best, and what it then finds."""
+def _tries(
+    looks: Sequence[LookCheckpoint], job: Job, pictures: Sequence[PictureFiles], workers: int | None
+) -> list[tuple[Mapping[str, LookCheckpoint], Evaluation]]:
+    """The look networks by class with each weight of the peaks' scores, and what is found with them."""
     from vm_export.change_model import change_confidence
 
-    name, found = look.contract.object_class, []
+    found: list[tuple[Mapping[str, LookCheckpoint], Evaluation]] = []
     with tempfile.TemporaryDirectory() as folder:
-        for weight in _MESH_WEIGHTS:
-            weighted = replace(look, contract=replace(look.contract, mesh_weight=weight))
+        for weight in _MESH_WEIGHTS if looks else (0.0,):
+            weighted = [replace(each, contract=replace(each.contract, mesh_weight=weight)) for each in looks]
             path = Path(folder) / "weighted.onnx"
-            change_confidence(job.model, path, [weighted], {})
+            change_confidence(job.model, path, weighted, {})
             tried = replace(job, model=path)
-            result = evaluate_with_progress(tried, tried.subject(), pictures, workers)
-            precision = result.objects[name].ranking(_OVERLAP).precision_recall.average_precision
-            print(f"{name}: average precision {precision:.4f} with a mesh weight of {weight:g}")
-            found.append((precision, weighted, result))
-    _, best, result = max(found, key=lambda each: each[0])
-    return best, result
+            by_class = {each.contract.object_class: each for each in weighted}
+            found.append((by_class, evaluate_with_progress(tried, tried.subject(), pictures, workers)))
+    return found
 
 
 def _calibration(name: str, result: Evaluation) -> tuple[Calibration, str]:
@@ -129,7 +121,8 @@ def _calibration(name: str, result: Evaluation) -> tuple[Calibration, str]:
     confidence fits before and after."""
     from ..scores.calibration import Calibration, Reliability, logits_from
 
-    confidence, right = _answers(result, name)
+    ranking = _ranking(result, name)
+    confidence, right = ranking.confidence, ranking.right
     count = int(right.sum())
     if min(count, len(right) - count) < _FEWEST:
         raise InputError(

@@ -36,7 +36,7 @@ def parser() -> argparse.ArgumentParser:
         "model",
         type=Path,
         metavar="MODEL",
-        help="checkpoint (.pt), model file (.onnx), or one from the package: ball, ball-small or soccer",
+        help="checkpoint (.pt), model file (.onnx), or one from the package: ball or soccer",
     )
     _add_data(made)
     made.add_argument(
@@ -71,7 +71,7 @@ def boxes_parser() -> argparse.ArgumentParser:
         "models",
         nargs="*",  # an option --names before them takes them along; see run_boxes
         metavar="MODEL",
-        help="model file (.onnx), or one from the package: ball, ball-small or soccer",
+        help="model file (.onnx), or one from the package: ball or soccer",
     )
     made.add_argument(
         "--boxes",
@@ -116,7 +116,7 @@ def calibrate_parser() -> argparse.ArgumentParser:
         "model",
         type=Path,
         metavar="MODEL",
-        help="model file (.onnx) with a close look, or one from the package: ball, ball-small or soccer",
+        help="model file (.onnx) with a close look, or one from the package: ball or soccer",
     )
     _add_data(made)
     made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="model file to write (.onnx)")

@@ -20,8 +20,6 @@ from .options import SET_EXAMPLE, add_configuration, add_data, add_hardware, add
 from .training import run_training
 
 if TYPE_CHECKING:
-    from vm_export.look_checkpoint import LookCheckpoint
-
     from ..look.training import LookTraining
     from ..runs.hardware import Hardware
 
@@ -31,7 +29,7 @@ def look_parser() -> argparse.ArgumentParser:
     made = Parser(
         prog="vm-train look",
         description="Train the close look of a mesh network: a small network that judges a patch of the picture at "
-        "each proposal of the mesh network. You can stop or kill it at any time: vm-train resume continues. On a CPU, "
+        "each peak of the mesh network. You can stop or kill it at any time: vm-train resume continues. On a CPU, "
         "the final network is the same as without the stop.",
     )
     add_data(made)
@@ -41,21 +39,8 @@ def look_parser() -> argparse.ArgumentParser:
         required=True,
         dest="model",
         metavar="MODEL",
-        help="mesh network whose proposals it judges: a checkpoint (.pt), a model file (.onnx), or a network of the "
+        help="mesh network whose peaks it judges: a checkpoint (.pt), a model file (.onnx), or a network of the "
         f"package ({', '.join(SHIPPED)})",
-    )
-    made.add_argument(
-        "--glance",
-        metavar="LOOK",
-        help="glance that judges first; the new close look judges what it passes on, and its file has both: a look.pt, "
-        "or the close look of a model file (.onnx) or of a network of the package",
-    )
-    made.add_argument(
-        "--start",
-        metavar="LOOK",
-        help="begin with the weights of a trained close look, not with random ones: a look.pt, a model file (.onnx), "
-        f"or a network of the package ({', '.join(SHIPPED)}). Its patches and layers, its glance, and training.rate "
-        "0.005 become the defaults",
     )
     add_output(made)
     add_configuration(made, "look")
@@ -67,14 +52,10 @@ def look_parser() -> argparse.ArgumentParser:
 def run_look(options: argparse.Namespace) -> int:
     """Begin the training of a close look, train, and return the exit status. Raises VisualMeshError."""
     from ..look.run import begin_look_run
-    from ..look.start import LookStart
 
-    start, configuration = _start_and_configuration(options)
-    glance = start.glance if start else None
-    if options.glance is not None:
-        glance = LookStart.load(model_path(options.glance), configuration.patches.object_class).look
     model = model_path(options.model)
-    configuration = _with_classes_of(model, configuration)
+    given = read_sections(LookConfiguration, options.config, parse_overrides(options.set, SET_EXAMPLE))
+    configuration = _with_classes_of(model, given)
 
     def begin(hardware: Hardware) -> None:
         numbers, data = [each.number for each in find_pictures(options.data)], configuration.data
@@ -89,28 +70,12 @@ def run_look(options: argparse.Namespace) -> int:
             str(options.model),
             strict=options.strict,
             threads=options.threads or 1,
-            glance=glance,
-            start=start,
         )
         count = [len(each) for each in asdict(split).values()]
         parts = f"{count[0]} for training, {count[1]} for validation, {count[2]} for test"
         print(f"{options.data}: {sum(count)} pictures: {parts}", flush=True)
 
     return run_training(options, options.output, partial(_load, options.output, None), _report, begin, alone=True)
-
-
-def _start_and_configuration(options: argparse.Namespace) -> tuple[LookCheckpoint | None, LookConfiguration]:
-    """The network of --start, and the configuration, whose defaults it changes. Raises InputError or ModelError."""
-    from ..look.start import LookStart
-
-    overrides = parse_overrides(options.set, SET_EXAMPLE)
-    configuration = read_sections(LookConfiguration, options.config, overrides)  # tells the class to judge
-    if options.start is None:
-        return None, configuration
-    start = LookStart.load(model_path(options.start), configuration.patches.object_class)
-    configuration = read_sections(LookConfiguration, options.config, overrides, defaults=start.defaults)
-    start.check(configuration)
-    return start.look, configuration
 
 
 def _with_classes_of(model: Path, configuration: LookConfiguration) -> LookConfiguration:
@@ -138,9 +103,6 @@ def _load(folder: Path, moved_to: Path | None, hardware: Hardware) -> LookTraini
 
 
 def _report(training: LookTraining) -> None:
-    """Print the commands to use next."""
+    """Print the command to use next."""
     run, look = training.run, training.run.result_path
-    if run.glance() is None:
-        behind = f"--from {run.mesh} --glance {look} -o {run.folder}-look"
-        print(f"next, to use it as a glance: vm-train look {run.data} {behind}")
     print(f"next: vm-export {run.mesh} --look {look} -o {run.folder / 'model.onnx'}")

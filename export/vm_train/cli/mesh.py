@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.config.sections import parse_overrides, read_sections
 from vm_embedded.errors import InputError
-from vm_embedded.field.uprights import KINDS
+from vm_embedded.field.features import UPRIGHTS
 from vm_embedded.files import exists
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
@@ -125,7 +125,7 @@ def _begin(
 
 def _without_bases(configuration: TrainConfiguration, pictures: Sequence[PictureFiles]) -> str:
     """A remark if pictures don't tell where the uprights stand whose bases the network should learn; else ""."""
-    names = [each for each in configuration.manifest.peaks if each in KINDS]
+    names = [each for each in configuration.manifest.peaks if each in UPRIGHTS]
     missing = sum(not exists(each.scene) for each in pictures)
     if not names or not missing:
         return ""

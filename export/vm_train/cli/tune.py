@@ -111,12 +111,6 @@ def _describe(run: TuningRun, boxes: Path) -> None:
     """Print the numbers of frames, and what is left out."""
     from ..tuning.boxed_objects import divided
 
-    look = run.before.manifest.look
-    if look is not None and look.is_wide:
-        print(
-            f"{run.model}: its wide look is left out; it would not know your objects of class {run.object_class}",
-            flush=True,
-        )
     recordings = len({each.recording for each in run.pictures})
     split = run.split
     count = len(split.training), len(split.validation), len(split.test)

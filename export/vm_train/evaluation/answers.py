@@ -14,17 +14,14 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from vm_embedded.arrays import Floats, Mask, Singles
+from vm_embedded.arrays import Chosen, Floats, Mask, Singles
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
-from vm_embedded.detection.looking import Look, chain_of, look_at, worth_of
+from vm_embedded.detection.looking import judge_classes
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Network, Observation, classify
-from vm_embedded.detection.places import PlanePlaces
+from vm_embedded.detection.observation import Classifier, Observation, classify
 from vm_embedded.detection.prepared_view import PreparedView
-from vm_embedded.detection.projection import Projection
-from vm_embedded.detection.proposals import propose
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -32,6 +29,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.field.features import FieldFeatures
 from vm_embedded.files import read_bytes
 from vm_embedded.geometry.orientation import rotation_z
+from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.layout import Feeds, Layout
@@ -53,10 +51,9 @@ class PictureAnswer:
     """The answer to a picture: pixels (n, 2), distances (n,) on the plane [m] and probabilities (n, C) of its points,
     and the objects found, most confident first.
 
-    proposals: for the close look's class, the centers (c, 3) [m] of its proposals, relative to the camera, in the frame
-    of `Detection.bearing`. Empty without a close look. passed: the same for the places that its first glance passes on,
-    where the glance saw an object. Empty without a glance. features: of the field, or None if the network has none.
-    manifest: with the radius of the objects that were looked for.
+    proposals: for each class of kind object with a close look, the centers (c, 3) [m] of the peaks that it judges,
+    relative to the camera, in the frame of `Detection.bearing`. features: of the field, or None if the network has
+    none. manifest: with the radius of the objects that were looked for.
     """
 
     pixels: Floats
@@ -64,13 +61,12 @@ class PictureAnswer:
     probabilities: Singles
     found: tuple[Detection, ...]
     proposals: Mapping[str, Floats]
-    passed: Mapping[str, Floats]
     manifest: Manifest
     features: FieldFeatures | None = None
 
 
 class Subject(Protocol):
-    """A network to evaluate. sha256: of its file. look: its close look, if it has one."""
+    """A network to evaluate. sha256: of its file. looks: its close looks, by class."""
 
     @property
     def manifest(self) -> Manifest: ...
@@ -79,7 +75,7 @@ class Subject(Protocol):
     @property
     def sha256(self) -> str: ...
     @property
-    def look(self) -> CloseLook | None: ...
+    def looks(self) -> Mapping[str, CloseLook]: ...
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         """Its answer to a picture. radius [m]: of the objects, for the mesh and the fits, if not the manifest's.
@@ -96,19 +92,19 @@ class ExactSubject:
     grid: Grid
     sha256: str
     settings: Settings
-    network: Network
-    look: CloseLook | None = None
-    upright_looks: Mapping[str, CloseLook] = field(default_factory=dict)
+    network: Classifier
+    looks: Mapping[str, CloseLook] = field(default_factory=dict)
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         observation = self.observe(picture, radius)
         found: tuple[Detection, ...] = ()
         features = None
         if self.grid.is_visual:
-            found, _ = locate(observation, self.look, self.settings, Stopwatch())
             is_wanted = self.settings.field_features
-            features = locate_features(observation, self.upright_looks, self.settings) if is_wanted else None
-        return _answer(observation, found, features, self.look, self.settings)
+            judged = judge_classes(observation, self.looks, self.settings, Stopwatch(), uprights=is_wanted)
+            found, _ = locate(observation, judged, self.settings, Stopwatch())
+            features = locate_features(observation, judged) if is_wanted else None
+        return _answer(observation, found, features, self.looks)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:
         """The points of a picture with their probabilities; see `Subject.answer`."""
@@ -116,13 +112,8 @@ class ExactSubject:
         if radius is not None:
             manifest = replace(manifest, radius=radius, object_radius=radius)
         shown = seen_points(picture.lens, picture.size, manifest, self.grid)
-        layout = choose_layout(shown.graph, manifest)
-        pixels = np.append(shown.pixels, np.full((1, 2), np.nan), axis=0)[layout.slots]  # NaN in gaps
-        projected = Projection(layout, pixels, layout.slots < len(shown))
-        view = _view(picture, layout, manifest, self.grid)
-        return classify(
-            Pyramid(picture.image, "bgr"), view, projected, manifest, self.network, self.settings, Stopwatch()
-        )
+        view = _view(picture, shown.graph, manifest, self.grid)
+        return classify(Pyramid(picture.image, "bgr"), view, shown, manifest, self.network, self.settings, Stopwatch())
 
 
 @dataclass(eq=False)
@@ -138,62 +129,39 @@ class RobotSubject:
         return self.detector.manifest
 
     @property
-    def look(self) -> CloseLook | None:
-        return self.detector.look
+    def looks(self) -> Mapping[str, CloseLook]:
+        return self.detector.looks
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         assert radius is None  # a robot's network is for balls of one size
         seen = self.detector.detect(picture.image, picture.orientation, picture.lens.lens)
-        return _answer(seen.observation, seen.objects, seen.field, self.look, self.detector.settings)
+        return _answer(seen.observation, seen.objects, seen.field, self.looks)
 
 
 def _answer(
     observation: Observation,
     found: tuple[Detection, ...],
     features: FieldFeatures | None,
-    look: CloseLook | None,
-    settings: Settings,
+    looks: Mapping[str, CloseLook],
 ) -> PictureAnswer:
-    distances = plane_distances(observation.rays, observation.view.height)
-    proposals, passed = {}, {}
-    if look is not None:
-        contract = look.contract
-        probabilities = observation.slot_probabilities[:, observation.manifest.column(contract.object_class)]
-        name, most = contract.object_class, settings.max_proposals
-        centers, _ = propose(observation, name, probabilities, contract.above, most)
-        proposals[name] = centers @ observation.view.heading.T
-        chain = chain_of(look)
-        if len(chain) > 1:
-            centers = passed_on(observation, centers, chain[0], worth_of(chain[1].contract))
-            passed[name] = centers @ observation.view.heading.T
+    distances, view = plane_distances(observation.rays, observation.view.height), observation.view
+    proposals = {}
+    for each in (look.contract for look in looks.values()):
+        if not each.upright_radius:
+            rays = observation.peaks[each.object_class].rays[: each.max_proposals]
+            proposals[each.object_class] = view.shape.center_along(rays, view.height) @ view.heading.T
     return PictureAnswer(
-        observation.pixels,
-        distances,
-        observation.probabilities,
-        found,
-        proposals,
-        passed,
-        observation.manifest,
-        features,
+        observation.pixels, distances, observation.probabilities, found, proposals, observation.manifest, features
     )
 
 
-def passed_on(observation: Observation, centers: Floats, glance: Look, least: float) -> Floats:
-    """Of places with these centers (c, 3), those to which a glance gives more than the probability `least`.
-
-    Their centers (k, 3), where the glance saw an object. Raises ModelError if the glance does not run.
-    """
-    places = PlanePlaces(observation, centers)
-    answers = look_at(places, glance)
-    return places.centers[(answers[:, 0] > least) & (places.centers[:, 2] < 0.0)]
-
-
-def _view(picture: Picture, layout: Layout, manifest: Manifest, grid: Grid) -> PreparedView:
-    """The view of a picture with a mesh for its own height."""
+def _view(picture: Picture, mesh: Mesh, manifest: Manifest, grid: Grid) -> PreparedView:
+    """The view of a picture with this mesh for its own height."""
     orientation = picture.orientation
     return PreparedView(
-        layout=layout,
-        levels=levels_of(picture, layout, manifest, grid),
+        mesh=mesh,
+        layout=choose_layout(mesh, manifest),
+        levels=levels_of(picture, mesh, manifest, grid),
         shape=manifest.object_shape,
         rings=manifest.rings_across(orientation.height, orientation.height),
         height=orientation.height,
@@ -215,9 +183,8 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
         if as_robot:
             return RobotSubject(Detector(model, settings), model.sha256)
         session = Session(model, settings.threads, settings.spinning)
-        look = CloseLook.of(model, settings.threads, settings.spinning)
-        uprights = CloseLook.of_uprights(model, settings.threads, settings.spinning)
-        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, look, uprights)
+        looks = CloseLook.of(model, settings.threads, settings.spinning)
+        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, looks)
     if kind != ".pt":
         raise InputError(f"{path}: a model must be a checkpoint (.pt) or a model file (.onnx), not {path.suffix!r}")
     if as_robot:
@@ -226,9 +193,7 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
 
     checkpoint = Checkpoint.load(path)
     digest = hashlib.sha256(read_bytes(path)).hexdigest()
-    on_canvas = checkpoint.manifest.layout == "canvas"
-    manifest = checkpoint.manifest if on_canvas else replace(checkpoint.manifest, layout="plain")
-    return ExactSubject(manifest, checkpoint.grid, digest, settings, TorchNetwork(checkpoint))
+    return ExactSubject(checkpoint.manifest, checkpoint.grid, digest, settings, TorchNetwork(checkpoint))
 
 
 class TorchNetwork:
@@ -240,8 +205,8 @@ class TorchNetwork:
         torch.set_num_threads(1)
         self._network = checkpoint.network
 
-    def run(self, layout: Layout, colors: Singles, on_screen: Mask) -> Singles:
-        """Probabilities (m, C) of the slots of a plain layout or a canvas, from their colors (3, m)."""
+    def run(self, layout: Layout, colors: Singles, on_screen: Mask, points: Chosen) -> Singles:
+        """See detection.observation.Classifier."""
         import torch
 
         def network(feeds: Feeds) -> Singles:
@@ -249,4 +214,4 @@ class TorchNetwork:
                 output = self._network(**{name: torch.from_numpy(each) for name, each in feeds.items()})
             return np.asarray(output.numpy(), dtype=np.float32)
 
-        return layout.answers(network, colors, on_screen)
+        return layout.answers(network, colors, on_screen, points)

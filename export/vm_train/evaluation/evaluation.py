@@ -53,8 +53,8 @@ class CameraPose:
 class Evaluation:
     """The result for some pictures.
 
-    objects: scores for each class of the kind object. proposals: scores for the class of the close look, if there is
-    one. passed: the same for what its glance passes on. poses: of the evaluated pictures. radii: of the balls [m], one
+    objects: scores for each class of the kind object. proposals: scores for each of them that has a
+    close look. poses: of the evaluated pictures. radii: of the balls [m], one
     for each picture with a sceneX.json. faults: the reason for each picture that was not evaluated, by path. features:
     scores of field features, for a Visual Mesh with the classes for them.
     """
@@ -62,7 +62,6 @@ class Evaluation:
     points: PointScores
     objects: dict[str, ObjectScores]
     proposals: dict[str, ProposalScores] = field(default_factory=dict)
-    passed: dict[str, ProposalScores] = field(default_factory=dict)
     poses: list[CameraPose] = field(default_factory=list)
     radii: list[float] = field(default_factory=list)
     faults: dict[str, str] = field(default_factory=dict)
@@ -75,13 +74,10 @@ class Evaluation:
         classes = subject.manifest.classes
         objects = [each.name for each in classes if each.kind == "object" and subject.grid.is_visual]
         scores = {name: ObjectScores(min_radius=MIN_RADIUS) for name in objects}
-        looks = [] if subject.look is None else [subject.look.contract.object_class]
-        proposals = {name: ProposalScores(min_radius=MIN_RADIUS) for name in looks if name in scores}
-        has_glance = subject.look is not None and subject.look.glance is not None
-        passed = {name: ProposalScores(min_radius=MIN_RADIUS) for name in proposals if has_glance}
+        proposals = {name: ProposalScores(MIN_RADIUS) for name in scores if name in subject.looks}
         names = {each.name for each in classes}
         features = FieldScores() if subject.grid.is_visual and names.issuperset(CLASSES) else None
-        return cls(PointScores([each.name for each in classes]), scores, proposals, passed, features=features)
+        return cls(PointScores([each.name for each in classes]), scores, proposals, features=features)
 
     def __add__(self, other: Evaluation) -> Evaluation:
         """The result for the pictures of both. Raises InputError if their classes or rules differ."""
@@ -89,7 +85,6 @@ class Evaluation:
             self.points + other.points,
             {name: scores + other.objects[name] for name, scores in self.objects.items()},
             {name: scores + other.proposals[name] for name, scores in self.proposals.items()},
-            {name: scores + other.passed[name] for name, scores in self.passed.items()},
             self.poses + other.poses,
             self.radii + other.radii,
             self.faults | other.faults,
@@ -118,8 +113,6 @@ class Evaluation:
                 self.worst += worst_errors_of(files, name, truths, found, mistakes)
             if name in self.proposals:
                 self.proposals[name].add(truths, answer.proposals[name])
-            if name in self.passed:
-                self.passed[name].add(truths, answer.passed[name])
         if self.features is not None and answer.features is not None:
             truth = field_truth(picture, stage, [each.name for each in answer.manifest.classes])
             self.features.add(truth, answer.features)

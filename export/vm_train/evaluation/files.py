@@ -16,7 +16,6 @@ from vm_workstation.plots import save_figure
 from .evaluation import Evaluation
 from .object_plots import distance_errors, object_curves, objects_over_distance, reliability
 from .point_plots import confusion, point_curves, points_over_distance
-from .proposal_plot import proposal_recalls
 from .report import page
 from .tables import as_csv, as_json
 from .worst_pictures import error_strips
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 _TABLES = ("points", "point_curves", "confusion", "objects", "object_curves", "calibration", "proposals", "field")
 _PLOTS = (
     *("points_curves", "points_over_distance", "confusion", "points_on_object"),
-    *("objects_curves", "objects_over_distance", "distance_error", "reliability", "proposals"),
+    *("objects_curves", "objects_over_distance", "distance_error", "reliability"),
 )
 _SCORES, _REPORT = "scores.json", "report.html"
 
@@ -116,6 +115,4 @@ def _figures(evaluation: Evaluation, threshold: float) -> dict[str, Figure]:
         figures["objects_over_distance"] = objects_over_distance(objects)
         figures["distance_error"] = distance_errors(objects)
         figures["reliability"] = reliability(objects)
-    if evaluation.proposals:
-        figures["proposals"] = proposal_recalls(evaluation.proposals, objects)
     return figures

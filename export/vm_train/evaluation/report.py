@@ -17,10 +17,9 @@ from .summary import (
     calibration,
     field_tables,
     object_table,
-    passed_on,
     point_table,
     proposal_counts,
-    proposal_tables,
+    proposal_table,
     subject,
     tables_by_overlap,
 )
@@ -36,9 +35,6 @@ CAPTIONS = {
     "reliability": "Calibration: share of the found objects that are right at the lower IoU, in 15 bins of confidence, "
     "with 90 % intervals. On the diagonal, nine of ten objects found with a confidence of 0.9 are right. The expected "
     "calibration error (ECE) is the mean distance from the diagonal, weighted by the number of objects in each bin.",
-    "proposals": "Proposals: share of the true objects with a proposal near their center, within 0.5 or 1 apparent "
-    "radius (r). Dotted: share of the true objects that the detector finds. The plots leave out bins with fewer than "
-    "10 true objects.",
     "points_curves": "Points of each class against all other points.",
     "points_over_distance": "Points by distance, at the threshold.",
     "confusion": "The most probable class of the points of each true class.",
@@ -67,12 +63,8 @@ def page(scores: Scores, plots: Mapping[str, bytes], strips: Mapping[str, Sequen
         parts.append(f"<p>{escape(calibration(scores['calibration'][name]))}.</p>")
     parts += [_plot(name, plots, about) for name in _OBJECT_PLOTS]
     for name, found in scores["proposals"].items():
-        tables = "".join(html_table(*each) for each in proposal_tables(found))
         parts.append(f"<h2>Proposals for class {escape(name)}</h2><p>{escape(proposal_counts(found))}.</p>")
-        if name in scores["passed"]:
-            parts.append(f"<p>{escape(passed_on(scores['passed'][name]))}.</p>")
-        parts.append(f'<div class="strip">{tables}</div>')
-    parts.append(_plot("proposals", plots, about))
+        parts.append(html_table(*proposal_table(found)))
     for heading, pictures in strips.items():
         if pictures:
             parts.append(f"<h2>{escape(heading)}</h2>{KEY}{html_strip(pictures)}")

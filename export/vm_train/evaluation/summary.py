@@ -21,11 +21,8 @@ def lines(scores: Scores) -> str:
         heading, body = object_table(by_overlap)
         rows += ["", f"objects of class {name}", *aligned([heading, *body]), calibration(scores["calibration"][name])]
     for name, found in scores["proposals"].items():
-        rows += ["", f"proposals for class {name}: {proposal_counts(found)}"]
-        if name in scores["passed"]:
-            rows.append(passed_on(scores["passed"][name]))
-        for heading, body in proposal_tables(found):
-            rows += aligned([heading, *body])
+        heading, body = proposal_table(found)
+        rows += ["", f"proposals for class {name}: {proposal_counts(found)}", *aligned([heading, *body])]
     for name, (heading, body) in field_tables(scores["field"]).items():
         rows += ["", name, *aligned([heading, *body])]
     heading, body = point_table(scores["points"])
@@ -78,30 +75,15 @@ def proposal_counts(found: Scores) -> str:
     return f"{as_number(found['mean_count'], 1)} per picture, at most {found['largest_count']}"
 
 
-def passed_on(found: Scores) -> str:
-    """What a glance passes on of the proposals."""
-    near = as_percent(found["all"]["recall_0.5"])
-    return f"The glance passes on {proposal_counts(found)}; {near} of the true objects have one within 0.5 radii"
-
-
-def proposal_tables(found: Scores) -> list[Table]:
-    """The recall of a class's proposals by distance, by radius and by visible share, without bins that have no object.
-
-    The first table begins with the recall of all objects.
-    """
-    tables: list[Table] = []
-    for measure, unit in (("distance", " [m]"), ("radius", " [px]"), ("visible", "")):
-        bins = found[f"by_{measure}"]
-        shown = ({"all": found["all"]} if measure == "distance" else {}) | bins
-        reaches = [key for key in found["all"] if key.startswith("recall_")]
-        heading = [measure + unit, "true", *(f"within {key.removeprefix('recall_')} r" for key in reaches)]
-        rows: list[Sequence[str]] = [
-            [name, str(each["truths"]), *(as_percent(each[key]) for key in reaches)]
-            for name, each in shown.items()
-            if each["truths"] or name == "all"
-        ]
-        tables.append((heading, rows))
-    return tables
+def proposal_table(found: Scores) -> Table:
+    """A row for each distance bin with true objects: the share of them that a class's proposals are near."""
+    reaches = [key for key in found["all"] if key.startswith("recall_")]
+    rows: list[Sequence[str]] = [
+        [name, str(each["truths"]), *(as_percent(each[key]) for key in reaches)]
+        for name, each in found.items()
+        if isinstance(each, Mapping) and (each["truths"] or name == "all")
+    ]
+    return ["distance [m]", "true", *(f"within {key.removeprefix('recall_')} r" for key in reaches)], rows
 
 
 def field_tables(found: Scores) -> dict[str, Table]:

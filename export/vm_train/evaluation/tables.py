@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from ..scores.distance_bins import named_bins
+from ..scores.distance_bins import DISTANCE_EDGES, named_bins
 from ..scores.field_scores import FieldScores
 from .evaluation import Evaluation
 
@@ -42,11 +42,7 @@ def as_json(evaluation: Evaluation, threshold: float) -> dict[str, Any]:
             name: {"iou": scores.overlaps[0], **scores.ranking(scores.overlaps[0]).reliability.as_dict()}
             for name, scores in evaluation.objects.items()
         },
-        "proposals": {
-            name: {"min_visible": scores.min_visible, "min_radius": scores.min_radius, **scores.as_dict()}
-            for name, scores in evaluation.proposals.items()
-        },
-        "passed": {name: scores.as_dict() for name, scores in evaluation.passed.items()},
+        "proposals": {name: scores.as_dict() for name, scores in evaluation.proposals.items()},
         "field": {} if evaluation.features is None else evaluation.features.as_dict(),
     }
 
@@ -118,11 +114,8 @@ def _calibration_rows(evaluation: Evaluation) -> Iterable[dict[str, object]]:
 
 def _proposal_rows(evaluation: Evaluation) -> Iterable[dict[str, object]]:
     for name, scores in evaluation.proposals.items():
-        counts = {"mean_count": scores.mean_count, "largest_count": scores.largest_count}
-        yield {"class": name, "by": "all", "bin": "all", **scores.recall().as_dict(), **counts}
-        for measure in scores.edges:
-            for place, recall in scores.recalls_by(measure).items():
-                yield {"class": name, "by": measure, "bin": place, **recall.as_dict()}
+        for where, number in named_bins(DISTANCE_EDGES).items():
+            yield {"class": name, "distance": where, **scores.row(number)}
 
 
 def _field_rows(features: FieldScores) -> Iterable[dict[str, object]]:

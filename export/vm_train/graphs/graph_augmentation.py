@@ -68,11 +68,10 @@ def mirror_image(graph: LabeledGraph, model: MeshModel) -> LabeledGraph:
 def mirrored_columns(model: MeshModel) -> npt.NDArray[np.intp]:
     """For each column of `neighbors`, the column that takes its place in the mirror image (N,).
 
-    Rings run from left to right, so each group of neighbors is reversed. A lattice's columns point ahead of the robot,
+    Rings run from left to right, so left and right are swapped. A lattice's columns point ahead of the robot,
     so a step of r rows to one side becomes a step of r rows to the other.
     """
     if model.steps is None:
-        pairs = {here: there for group in model.groups for here, there in zip(group, reversed(group), strict=True)}
-        return np.array([pairs[place] for place in range(model.neighbors)])
+        return np.array(model.mirrored)
     slant = len(model.steps) == 6  # each row of such a lattice begins half a column after the one before
     return np.array([model.steps.index((column + row if slant else column, -row)) for column, row in model.steps])

@@ -14,7 +14,7 @@ from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.footprint import Levels, levels_for, uniform_levels
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
-from vm_embedded.mesh.mesh import STRIDE, PointGraph
+from vm_embedded.mesh.mesh import STRIDE, Mesh
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import VISUAL, Grid
@@ -87,9 +87,6 @@ def graph_of(
     places: of the picture's objects, for a network with peaks.
     """
     shown = seen_points(picture.lens, picture.size, manifest, grid)
-    strips, margin = shown.graph.strips, shown.graph.margin
-    if strips is not None and margin is not None:  # as in a canvas, which leaves out strips of context only
-        shown = shown.only(np.isin(strips, strips[~margin])).visible
     x, y = np.rint(shown.pixels).astype(np.intp).T
     labels = picture.labels[y, x]
     if shown.graph.margin is None:
@@ -110,13 +107,13 @@ def graph_of(
     return graph
 
 
-def levels_of(picture: Picture, graph: PointGraph, manifest: Manifest, grid: Grid) -> Levels:
+def levels_of(picture: Picture, mesh: Mesh, manifest: Manifest, grid: Grid) -> Levels:
     """Which picture of the pyramid colors each of the points."""
     if grid.is_visual:
-        return levels_for(manifest, graph, picture.orientation.height, picture.fitted_lens)
+        return levels_for(manifest, mesh, picture.orientation.height, picture.fitted_lens)
     width, height = picture.size
     single = manifest.sampling == "bilinear"
-    return uniform_levels(len(graph), 1.0 if single else math.sqrt(height * width / max(len(graph), 1)))
+    return uniform_levels(len(mesh), 1.0 if single else math.sqrt(height * width / max(len(mesh), 1)))
 
 
 def plane_distances(rays: Floats, height: float) -> Floats:

@@ -17,7 +17,7 @@ from vm_export.grid import VISUAL, Grid
 from .hexagonal import HexagonalMesh, hexagonal_mesh, visible_hexagonal_mesh
 
 
-def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VISUAL) -> Projection[Mesh]:
+def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VISUAL) -> Projection:
     """The points that a network gets of a picture: on screen all of them, rays in the observation-plane frame.
 
     The lens file must hold an orientation. Raises GeometryError if the camera is too low for a mesh, and InputError if
@@ -29,7 +29,8 @@ def seen_points(lens: LensFile, size: Size, manifest: Manifest, grid: Grid = VIS
     mesh = manifest.model.build(manifest.mesh_shape, orientation.height, manifest.intersections, manifest.max_distance)
     mesh = _near_picture(mesh, orientation.level, fitted, size)
     if grid.is_visual:
-        return project(mesh, orientation.level, fitted, size).visible
+        seen = project(mesh, orientation.level, fitted, size)
+        return seen.only(mesh.needed(seen.on_screen)).visible
     if grid.equal_at:
         flat = _equal_hexagonal_mesh(fitted, size, manifest, orientation.height, grid.equal_at)
     else:

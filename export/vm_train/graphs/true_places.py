@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.field.uprights import KINDS
+from vm_embedded.field.features import UPRIGHTS
 from vm_embedded.network.manifest import Manifest
 
 from ..data.pictures import Picture
@@ -44,16 +44,16 @@ def true_places(picture: Picture, scene: Path | None, manifest: Manifest) -> lis
     truth = None if scene is None else read_scene(scene)
     field = None if scene is None else read_field(scene)
     names = [each.name for each in manifest.classes]
-    uprights = true_uprights(picture, field, names) if KINDS.keys() & manifest.peaks else None
+    uprights = true_uprights(picture, field, names) if UPRIGHTS.keys() & manifest.peaks else None
     view, found = GroundView.of(picture), []
     for name in manifest.peaks:
         number = names.index(name)
-        if name not in KINDS:
+        if name not in UPRIGHTS:
             found += _objects(picture, truth, view, name, number, 2.0 * manifest.object_radius)
         elif uprights is None:
             found.append(TruePlace(number))
         else:
-            bases = uprights[KINDS[name]]
+            bases = uprights[UPRIGHTS[name]]
             pixels = view.pixels(np.array([each.position for each in bases]).reshape(-1, 2))
             found += [
                 TruePlace(number, (x, y), base.width, base.visible)

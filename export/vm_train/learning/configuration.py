@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from vm_embedded.config.entries import check_entries, number, one_of, share
 from vm_embedded.errors import InputError
-from vm_embedded.field.uprights import KINDS
+from vm_embedded.field.features import UPRIGHTS
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import POINT_COLORS, POINT_SAMPLINGS, Manifest
@@ -199,7 +199,7 @@ class TrainConfiguration:
         """The classes whose objects a network on octaves finds by peaks."""
         if self.mesh.model != "octaves":
             return ()
-        return tuple(each.name for each in self.classes.outputs if each.kind == "object" or each.name in KINDS)
+        return tuple(each.name for each in self.classes.outputs if each.kind == "object" or each.name in UPRIGHTS)
 
     @property
     def manifest(self) -> Manifest:
@@ -218,7 +218,6 @@ class TrainConfiguration:
             any_radius=mesh.radius_of == "scene",
             sampling=mesh.sampling,
             colors=mesh.colors,
-            layout="canvas" if mesh.model == "octaves" else "plain",
             peaks=self._peaks,
         )
 

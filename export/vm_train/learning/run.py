@@ -155,7 +155,7 @@ class MeshRun(Run):
             "training_pictures": str(len(split.training)),
             "validation_pictures": str(len(split.validation)),
             "pictures_sha256": used,
-            "configuration_sha256": self.digests["train.toml"],
+            "train_toml_sha256": self.digests["train.toml"],
             "selection": recipe.selection,
             "loss": recipe.loss,
             "start_sha256": "none" if self.start is None else self.start.sha256,

@@ -41,7 +41,7 @@ class MeshTraining(Training):
     def __init__(self, run: MeshRun, hardware: Hardware) -> None:
         self.run, self._hardware, recipe = run, hardware, run.configuration.training
         super().__init__()
-        self.rounds, self.patience, self.epochs = recipe.trainings, recipe.patience, range(recipe.epochs)
+        self.rounds, self.patience, self.epochs = recipe.trainings, recipe.patience, recipe.epochs
         # repeats: how often an epoch uses each picture
         self.steps = steps_an_epoch(recipe.repeats * len(run.split.training), recipe.batch)
         self.pictures, self._began = 0, perf_counter()

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-import cv2
-import numpy as np
 import torch
 from torch.nn import functional
 
@@ -34,32 +32,27 @@ def augment(
     makes the same changes. An entry that is switched off leaves the random numbers of the others as they are.
     """
     count, device = len(patches), patches.device
-    chance = torch.rand((7, count), generator=random).to(device)
-    strength = torch.rand((3, count), generator=random).to(device)
+    chance = torch.rand((5, count), generator=random).to(device)
+    strength = torch.rand((2, count), generator=random).to(device)
     normal = torch.randn((6, count), generator=random).to(device)
     offset = 2.0 * torch.rand((2, count), generator=random).to(device) - 1.0
     rectangle = torch.rand((4, count), generator=random).to(device)
     color = torch.rand((count, 3), generator=random).to(device)
-    order = torch.rand((count, 3), generator=random).argsort(dim=1).to(device)
     x = patches.float() / 255.0
     x, targets = _mirrored(x, targets, chance[0] < settings.mirror)
     if settings.rotation or settings.zoom or settings.shift:
         angle, zoom = math.radians(settings.rotation) * normal[4], torch.exp(settings.zoom * normal[5])
         x, targets = _moved(x, targets, angle, zoom, settings.shift * offset, extent)
-    x = _where(chance[6] < settings.hidden, lambda some, rows: _hidden(some, rectangle[:, rows], color[rows]), x)
+    x = _where(chance[1] < settings.hidden, lambda some, rows: _hidden(some, rectangle[:, rows], color[rows]), x)
     x = x.clamp_min(1e-4) ** _each(torch.exp(settings.gamma * normal[0]))
     x = x * torch.exp(settings.gain * normal[1:4].T)[:, None, None, :]
-    x = _where(chance[1] < settings.swap, lambda some, rows: _permuted(some, order[rows]), x)
     x = _where(chance[2] < settings.gray, lambda some, rows: some.mean(dim=3, keepdim=True).expand_as(some), x)
     low, high = settings.blur
     sigma = low + (high - low) * strength[0]
     x = _where(chance[3] < settings.blur_share, lambda some, rows: _blurred(some, sigma[rows]), x)
     deviation = settings.noise * strength[1]
     x = _where(chance[4] < settings.noise_share, lambda some, rows: _noisy(some, deviation[rows], random), x)
-    x = x.clamp(0.0, 1.0) * 255.0
-    low, high = settings.jpeg
-    quality = low + (high - low) * strength[2]
-    return _where(chance[5] < settings.jpeg_share, lambda some, rows: _compressed(some, quality[rows]), x), targets
+    return x.clamp(0.0, 1.0) * 255.0, targets
 
 
 def _each(values: torch.Tensor) -> torch.Tensor:
@@ -112,11 +105,6 @@ def _hidden(x: torch.Tensor, rectangle: torch.Tensor, color: torch.Tensor) -> to
     return torch.where((along[:, :, None] & across[:, None, :])[..., None], color[:, None, None, :], x)
 
 
-def _permuted(x: torch.Tensor, order: torch.Tensor) -> torch.Tensor:
-    """Patches with their color channels in another order (n, 3)."""
-    return x.gather(3, order[:, None, None, :].expand_as(x))
-
-
 def _blurred(x: torch.Tensor, sigma: torch.Tensor) -> torch.Tensor:
     """Patches after a Gaussian blur with a standard deviation (n,) for each."""
     count, size = x.shape[:2]
@@ -133,13 +121,3 @@ def _blurred(x: torch.Tensor, sigma: torch.Tensor) -> torch.Tensor:
 def _noisy(x: torch.Tensor, deviation: torch.Tensor, random: torch.Generator) -> torch.Tensor:
     """Patches with noise of a standard deviation (n,) for each, where 1 is white."""
     return x + torch.randn(x.shape, generator=random).to(x.device) * _each(deviation)
-
-
-def _compressed(x: torch.Tensor, quality: torch.Tensor) -> torch.Tensor:
-    """Patches, 0 to 255, after JPEG compression with a quality (n,) for each."""
-    images = x.flip(3).round().to(torch.uint8).cpu().numpy()  # BGR, as OpenCV has it
-    made = np.empty_like(images)
-    for image, target, each in zip(images, made, quality.tolist(), strict=True):
-        file = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, round(each)])[1]
-        target[:] = cv2.imdecode(file, cv2.IMREAD_COLOR)
-    return torch.from_numpy(made).to(x.device).float().flip(3)

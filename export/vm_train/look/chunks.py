@@ -19,18 +19,17 @@ def collect_chunks(
     make: Callable[[], Callable[[Work], PatchChunk]],
     size: int,
     folder: Path,
-    prefix: str,
     workers: int,
     report: Callable[[int], None],
 ) -> list[Path]:
     """Collect the patches of all pictures, and return their files in `folder`, each a PatchChunk of `size` pictures.
 
-    make: makes the function that collects from a picture. prefix: of the files' names; files that are there stay.
-    workers: processes; 1 uses only this process. report: is called with the number of pictures that are done. Raises
-    what the function raises, InputError if a file can't be written, and VisualMeshError if a worker was killed.
+    make: makes the function that collects from a picture. Files that are there stay. workers: processes; 1 uses only
+    this process. report: is called with the number of pictures that are done. Raises what the function raises,
+    InputError if a file can't be written, and VisualMeshError if a worker was killed.
     """
     starts = range(0, len(items), size)
-    groups = {folder / f"{prefix}{start // size:05d}.npz": items[start : start + size] for start in starts}
+    groups = {folder / f"{start // size:05d}.npz": items[start : start + size] for start in starts}
     missing = {path: group for path, group in groups.items() if not path.exists()}
     remaining = [item for group in missing.values() for item in group]
     done = len(items) - len(remaining)

@@ -18,14 +18,9 @@ from .observing import Observer, RunPicture, items_of
 from .patch_set import PatchChunk, PatchSet
 from .places import jittered_places, proposed_places, random_places
 from .run import LookRun
-from .torch_look import TorchLook
 
 CHUNK = 100
 """Pictures in a file of patches."""
-
-_SURER = 0.1
-"""Share of the usual limit. The glance passes on less in the pictures that it was trained on; with this limit, about as
-much as in others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +29,11 @@ class Collector:
 
     run: LookRun
     observer: Observer
-    glance: TorchLook | None
 
     @classmethod
     def of(cls, run: LookRun) -> Collector:
         """The collector of a run. Raises InputError or ModelError."""
-        return cls(run, Observer.of(run), TorchLook.of(run.glance()))
+        return cls(run, Observer.of(run))
 
     def __call__(self, item: RunPicture) -> PatchChunk:
         """The patches of a picture; none, and a fault, if it can't be used. In a strict run, raises InputError then."""
@@ -57,10 +51,7 @@ class Collector:
     def _collect(self, item: RunPicture) -> PatchChunk:
         settings, seen = self.run.configuration.patches, self.observer.observe(item.files)
         observation, truths, view = seen.observation, seen.truths, seen.observation.view
-        share = 1.0 if item.validates else _SURER
-        places = proposed_places(
-            observation, self.observer.object_class, seen.probabilities, settings, self.glance, share
-        )
+        places = proposed_places(view, seen.peaks, settings)
         if not item.validates:
             random = random_of(settings.seed, item.files.number)
             places += jittered_places(view, truths, settings, random)
@@ -87,7 +78,7 @@ def collect_patches(run: LookRun, workers: int, report: Callable[[int], None]) -
     that are already in the folder stay. Raises InputError if a picture is missing, or, in a strict run, can't be used;
     VisualMeshError if a worker was killed.
     """
-    return collect_chunks(items_of(run), partial(Collector.of, run), CHUNK, run.patches, "", workers, report)
+    return collect_chunks(items_of(run), partial(Collector.of, run), CHUNK, run.patches, workers, report)
 
 
 def random_of(seed: int, picture: str) -> np.random.Generator:

@@ -56,19 +56,11 @@ class PatchSettings:
         "apparent radii of the object",
         (0.5, 8.0),
     )
-    above: float = number(
-        0.003, "probability of a mesh point from which it counts for a proposal; lower: more proposals", "", (0.0, 0.99)
+    max_proposals: int = number(
+        10, "largest number of peaks that it judges in a picture, here and on the robot", "", (1, 128)
     )
-    passes: int = number(
-        3,
-        "on the robot: how often a proposal is judged at most; each further pass cuts a new patch "
-        "around the center that the previous pass found",
-        "",
-        (1, 4),
-    )
-    proposals: int = number(40, "largest number of proposals of the mesh network in a picture", "", (1, 1000))
     jittered: int = number(6, "patches beside true objects in a training picture with objects", "", (0, 1000))
-    jitter: float = number(0.6, "largest distance of these from the true center", "apparent radii", (0.0, 1.0))
+    jitter: float = number(0.9, "largest distance of these from the true center", "apparent radii", (0.0, 1.0))
     size_jitter: float = number(
         0.2,
         "natural logarithm of the largest factor by which these are cut too large or too small; the network learns "
@@ -144,9 +136,10 @@ class LookRecipe:
     def __post_init__(self) -> None:
         check_entries(self)
 
-    def round_of(self, epoch: int) -> int:
-        """Round of an epoch; both are counted from 0."""
-        return epoch * min(self.rounds, self.epochs) // self.epochs
+    def begins_round(self, epoch: int) -> bool:
+        """Whether an epoch, counted from 0, begins a round after the first one."""
+        before, now = ((epoch - 1 + each) * min(self.rounds, self.epochs) // self.epochs for each in (0, 1))
+        return epoch > 0 and before < now
 
 
 @dataclass(frozen=True)
@@ -162,14 +155,11 @@ class PatchAugmentation:
     hidden: float = share(0.2, "share of the patches of which a rectangle is hidden")
     gamma: float = number(0.15, "standard deviation of the logarithm of the gamma exponent", "", (0.0, 2.0))
     gain: float = number(0.12, "standard deviation of the logarithm of each color channel's gain", "", (0.0, 2.0))
-    swap: float = share(0.0, "share of the patches whose color channels are permuted")
     gray: float = share(0.03, "share of the patches without color")
     blur_share: float = share(0.1, "share of the patches that are blurred")
     blur: tuple[float, float] = range_of(0.4, 1.0, "range of the blur's standard deviation", "samples", (0.1, 3.0))
     noise_share: float = share(0.2, "share of the patches with noise")
     noise: float = number(0.02, "largest standard deviation of the noise, as a share of white", "", (0.0, 1.0))
-    jpeg_share: float = share(0.0, "share of the patches that are compressed as JPEG")
-    jpeg: tuple[float, float] = range_of(30.0, 90.0, "range of the JPEG quality", "", (1.0, 100.0))
 
     def __post_init__(self) -> None:
         check_entries(self)

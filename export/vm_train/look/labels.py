@@ -22,7 +22,7 @@ from ..truth.objects import SceneTruth, true_objects
 
 NOTHING, OBJECT, UNLABELED = 0, 1, -1
 
-NEAR, FAR = 0.6, 1.0
+NEAR, FAR = 0.9, 1.3
 """Distances of a place from a true center, in the object's expected radii: up to `NEAR` the object is at the place,
 from `FAR` on it is not. A place between them is unlabeled."""
 
@@ -39,15 +39,12 @@ class Truths:
     """True objects: centers (t, 3) relative to the camera in the mesh frame [m], radii (t,) [m], of tall objects half
     their heights, and visible shares (t,) of their outlines.
 
-    near, far: see NEAR and FAR. sizes (t,): logarithms of the sizes that the network learns over the radii; None for
-    the radii themselves.
+    sizes (t,): logarithms of the sizes that the network learns over the radii; None for the radii themselves.
     """
 
     centers: Floats
     radii: Floats
     visible: Floats
-    near: float = NEAR
-    far: float = FAR
     sizes: Floats | None = None
 
     def __len__(self) -> int:
@@ -76,29 +73,26 @@ class PlaceLabels:
 def label_places(places: Tangents, truths: Truths) -> PlaceLabels:
     """Labels of places, whose `radius` is that of the object that is expected there."""
     right, down, off, size = _differences(places, truths)
-    found = label_by_differences(right, down, off, size, truths.visible >= VISIBLE, truths.near, truths.far)
+    found = label_by_differences(right, down, off, size, truths.visible >= VISIBLE)
     if truths.sizes is not None:
         # Added to the size of the radius, which depends on how large the patch is cut; 0 for places without an object.
         found.targets[:, 2] += np.append(truths.sizes, 0.0)[found.of]
     return found
 
 
-def label_by_differences(
-    right: Floats, down: Floats, off: Floats, size: Floats, visible: Mask, near: float = NEAR, far: float = FAR
-) -> PlaceLabels:
+def label_by_differences(right: Floats, down: Floats, off: Floats, size: Floats, visible: Mask) -> PlaceLabels:
     """Labels of n places from their differences (n, t) to t objects.
 
     right, down: shift of the object's center from the place, off: its length, all in expected radii. size: logarithm of
     the object's size over the expected one. visible (t,): whether enough of the object is visible to give a label.
-    near, far: see NEAR and FAR.
     """
     count, objects = off.shape
     if not objects:
         return PlaceLabels(
             np.zeros(count, np.int8), np.zeros((count, 3), np.float32), np.full(count, -1, dtype=np.int64)
         )
-    maybe = (off < far) & (np.abs(size) < UNLIKE)
-    surely = (off <= near) & (np.abs(size) <= ALIKE) & visible
+    maybe = (off < FAR) & (np.abs(size) < UNLIKE)
+    surely = (off <= NEAR) & (np.abs(size) <= ALIKE) & visible
     nearest = np.where(surely, off, np.inf).argmin(axis=1)
     has_object = np.asarray(surely.any(axis=1))
     labels = np.where(has_object, OBJECT, np.where(maybe.any(axis=1), UNLABELED, NOTHING)).astype(np.int8)
@@ -142,9 +136,6 @@ def find_truths(
     return Truths(centers, np.full(len(known), view.shape.half_size), shares)
 
 
-BASE_NEAR, BASE_FAR = 0.9, 1.3
-"""As NEAR and FAR, for bases of uprights, which are proposed less exactly."""
-
 _NARROWEST, _WIDEST = 0.02, 3.0
 """Limits of the width of an upright [m]."""
 
@@ -169,8 +160,6 @@ def true_bases(
         centers=places @ view.heading,
         radii=np.full(len(found), view.shape.half_size),
         visible=np.array([float(each.visible) for each in found]),
-        near=BASE_NEAR,
-        far=BASE_FAR,
         sizes=np.log(widths / (2.0 * view.shape.half_size)),
     )
 

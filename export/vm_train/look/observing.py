@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from vm_embedded.arrays import Singles
+from vm_embedded.detection.looking import around_bases
 from vm_embedded.detection.observation import Observation
-from vm_embedded.detection.upright_looks import around_bases, nearest_points
+from vm_embedded.detection.peaks import Peaks
 from vm_embedded.errors import InputError
-from vm_embedded.field.uprights import KINDS
+from vm_embedded.field.features import UPRIGHTS
 from vm_embedded.network.manifest import Manifest
 
 from ..data.classes import Classes
@@ -17,7 +17,6 @@ from ..data.pictures import find_pictures, read_picture
 from ..evaluation.answers import ExactSubject
 from ..truth.field import read_field
 from ..truth.objects import SceneTruth, read_scene
-from .configuration import PatchSettings
 from .labels import Truths, find_truths, true_bases
 from .run import LookRun
 
@@ -46,10 +45,10 @@ def items_of(run: LookRun) -> list[RunPicture]:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """A picture after the mesh network: probabilities (m,) of the judged class at the slots, and the true objects."""
+    """A picture after the mesh network: the peaks of the judged class, and the true objects."""
 
     observation: Observation
-    probabilities: Singles
+    peaks: Peaks
     truths: Truths
 
 
@@ -57,45 +56,39 @@ class Observed:
 class Observer:
     """The mesh network of a run.
 
-    classes: colors in masks. in_masks: a manifest with the classes of the masks. patches: says around what patches of a
-    class of kind upright are cut, and which points propose a place. kind: of uprights, None for objects.
+    classes: colors in masks. in_masks: a manifest with the classes of the masks. upright_radius: of the circles
+    around bases [m], for a class of kind upright. kind: of uprights, None for objects.
     """
 
     subject: ExactSubject
     classes: Classes
     in_masks: Manifest
     object_class: str
-    patches: PatchSettings
+    upright_radius: float
     kind: str | None
 
     @classmethod
     def of(cls, run: LookRun) -> Observer:
         """Read the mesh network. Raises InputError or ModelError."""
         subject, table = run.subject(), run.configuration.classes
-        in_masks = replace(subject.manifest, classes=table.outputs, look=None, upright_looks=(), self_test=None)
+        in_masks = replace(subject.manifest, classes=table.outputs, looks=(), peaks=(), self_test=None)
         name = run.object_class
         kinds = {each.name: each.kind for each in subject.manifest.classes}
-        kind = KINDS[name] if kinds[name] == "upright" else None
-        return cls(subject, table.mask_classes(), in_masks, name, run.configuration.patches, kind)
+        kind = UPRIGHTS[name] if kinds[name] == "upright" else None
+        return cls(subject, table.mask_classes(), in_masks, name, run.upright_radius, kind)
 
     def observe(self, files: PictureFiles) -> Observed:
         """Raises InputError or GeometryError for a picture that can't be used."""
         picture = read_picture(files, self.classes)
         scene = read_scene(files.scene)
         observation = self.subject.observe(picture, self._radius(scene))
-        manifest = observation.manifest
-        probabilities = observation.slot_probabilities[:, manifest.column(self.object_class)]
+        manifest, peaks = observation.manifest, observation.peaks[self.object_class]
         if self.kind is not None:
-            probabilities = nearest_points(observation, probabilities, self.patches.above)
-            circles = around_bases(observation, self.patches.upright_radius)
-            field = read_field(files.scene)
-            return Observed(
-                circles, probabilities, true_bases(picture, field, self.classes.names, circles.view, self.kind)
-            )
+            view = around_bases(observation, self.upright_radius)
+            truths = true_bases(picture, read_field(files.scene), self.classes.names, view, self.kind)
+            return Observed(replace(observation, view=view), peaks.apart(view), truths)
         in_masks = replace(self.in_masks, radius=manifest.radius, object_radius=manifest.object_radius)
-        return Observed(
-            observation, probabilities, find_truths(picture, scene, in_masks, observation.view, self.object_class)
-        )
+        return Observed(observation, peaks, find_truths(picture, scene, in_masks, observation.view, self.object_class))
 
     def _radius(self, scene: SceneTruth | None) -> float | None:
         """Radius of the objects to look for [m]: that of the scene, if the mesh network is for any radius."""

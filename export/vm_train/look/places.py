@@ -1,7 +1,4 @@
-"""The places that patches are cut at: proposals of the mesh network, places beside true objects, and random places.
-
-With a glance, the proposals are those that it passes on, at the centers that it found.
-"""
+"""The places that patches are cut at: peaks of the mesh network, places beside true objects, and random places."""
 
 from __future__ import annotations
 
@@ -10,14 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Image, Singles
-from vm_embedded.detection.looking import Look, worth_of
+from vm_embedded.arrays import Floats, Image
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
+from vm_embedded.detection.peaks import Peaks
 from vm_embedded.detection.prepared_view import PreparedView
-from vm_embedded.detection.proposals import propose
 
-from ..evaluation.answers import passed_on
 from .configuration import PatchSettings
 from .labels import VISIBLE, Truths
 
@@ -26,7 +21,7 @@ _DRAWS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class PatchPlaces:
     """n places: centers (n, 3) relative to the camera in the mesh frame [m], and factors (n,) by which their patches
     are larger than the object that is expected there needs."""
 
@@ -37,16 +32,16 @@ class Places:
         return len(self.centers)
 
     @classmethod
-    def of(cls, centers: Floats) -> Places:
+    def of(cls, centers: Floats) -> PatchPlaces:
         """Places with factor 1."""
         return cls(centers, np.ones(len(centers)))
 
-    def __add__(self, other: Places) -> Places:
-        return Places(np.concatenate([self.centers, other.centers]), np.concatenate([self.factors, other.factors]))
+    def __add__(self, other: PatchPlaces) -> PatchPlaces:
+        return PatchPlaces(np.concatenate([self.centers, other.centers]), np.concatenate([self.factors, other.factors]))
 
-    def part(self, chosen: npt.NDArray[np.bool_]) -> Places:
+    def part(self, chosen: npt.NDArray[np.bool_]) -> PatchPlaces:
         """The places of a mask (n,)."""
-        return Places(self.centers[chosen], self.factors[chosen])
+        return PatchPlaces(self.centers[chosen], self.factors[chosen])
 
     def tangents(self, view: PreparedView) -> Tangents:
         """The planes of their patches; the radius includes the factor."""
@@ -59,40 +54,29 @@ class Places:
         return cut_patches(observation.pyramid, nodes, settings.size)
 
 
-def proposed_places(
-    observation: Observation,
-    class_name: str,
-    probabilities: Singles,
-    settings: PatchSettings,
-    glance: Look | None,
-    share: float,
-) -> Places:
-    """The proposals of a class from the slots' probabilities (m,), best first.
-
-    share: of the probability above which the glance passes a proposal on. Raises ModelError if the glance does not run.
-    """
-    centers, _ = propose(observation, class_name, probabilities, settings.above, settings.proposals)
-    if glance is not None:
-        centers = passed_on(observation, centers, glance, share * worth_of(glance.contract))
-    return Places.of(centers)
+def proposed_places(view: PreparedView, peaks: Peaks, settings: PatchSettings) -> PatchPlaces:
+    """The peaks that a look judges, best first."""
+    return PatchPlaces.of(view.shape.center_along(peaks.rays[: settings.max_proposals], view.height))
 
 
-def jittered_places(view: PreparedView, truths: Truths, settings: PatchSettings, random: np.random.Generator) -> Places:
+def jittered_places(
+    view: PreparedView, truths: Truths, settings: PatchSettings, random: np.random.Generator
+) -> PatchPlaces:
     """Places up to `jitter` radii from true objects of which enough is visible, in turn, with factors of the size."""
     chosen = np.flatnonzero(truths.visible >= VISIBLE)
     distance, angle, size = random.random((3, settings.jittered))
     if not len(chosen):
-        return Places.of(np.empty((0, 3)))
+        return PatchPlaces.of(np.empty((0, 3)))
     chosen = chosen[np.arange(settings.jittered) % len(chosen)]
     objects = Tangents.at(view, truths.centers[chosen])
     off, angle = settings.jitter * np.sqrt(distance), 2.0 * np.pi * angle
     rays = objects.rays(off * np.cos(angle), off * np.sin(angle))
     factors = np.exp(settings.size_jitter * (2.0 * size - 1.0))
     below = rays[:, 2] < 0.0
-    return Places(view.shape.center_along(rays[below], view.height), factors[below])
+    return PatchPlaces(view.shape.center_along(rays[below], view.height), factors[below])
 
 
-def random_places(observation: Observation, settings: PatchSettings, random: np.random.Generator) -> Places:
+def random_places(observation: Observation, settings: PatchSettings, random: np.random.Generator) -> PatchPlaces:
     """Places on the plane at random pixels of the picture, as far as the mesh reaches."""
     view = observation.view
     pixels = random.random((_DRAWS * settings.random, 2)) * view.size - 0.5
@@ -100,4 +84,4 @@ def random_places(observation: Observation, settings: PatchSettings, random: np.
     rays = rays[np.isfinite(rays).all(axis=1)]
     centers = view.shape.center_along(rays[rays[:, 2] < 0.0], view.height)
     near = np.hypot(centers[:, 0], centers[:, 1]) < observation.manifest.max_distance
-    return Places.of(centers[near][: settings.random])
+    return PatchPlaces.of(centers[near][: settings.random])

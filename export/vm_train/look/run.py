@@ -1,10 +1,9 @@
 """The training of a close look, and the files of its folder.
 
 look.toml: the configuration. pictures.json: the split of the pictures. run.json: where the pictures are. mesh.onnx or
-mesh.pt: a copy of the mesh network. glance.pt: a copy of the glance, if there is one. start.pt: a copy of the look
-network that the training begins with, if there is one. patches/: the patches, in chunks. state.pt: the state to resume
-from. log.jsonl, tensorboard/: the record of each step. look.pt: the network. result.json: what it finds in the
-validation pictures, and how often its probabilities are right.
+mesh.pt: a copy of the mesh network. patches/: the patches, in chunks. state.pt: the state to resume from. log.jsonl,
+tensorboard/: the record of each step. look.pt: the network. result.json: what it finds in the validation pictures, and
+how often its probabilities are right.
 """
 
 from __future__ import annotations
@@ -15,16 +14,14 @@ from pathlib import Path
 from vm_embedded.config.sections import read_sections
 from vm_embedded.files import read_bytes, write_file
 from vm_embedded.output.result_files import make_folder
-from vm_export.look_checkpoint import LookCheckpoint
 
 from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject
 from ..runs.run import Run, check_unused, description, write_run
 from .configuration import LookConfiguration
-from .fitting import check_glance, class_to_judge, load_mesh, upright_radius_of
+from .fitting import class_to_judge, load_mesh
 
-_GLANCE, _START = "glance.pt", "start.pt"
-_FILES = ("look.toml", "mesh.onnx", "mesh.pt", _GLANCE, _START, "patches", "look.pt", "result.json")
+_FILES = ("look.toml", "mesh.onnx", "mesh.pt", "patches", "look.pt", "result.json")
 """Files that a new training would overwrite, besides those of all trainings."""
 
 
@@ -64,24 +61,11 @@ class LookRun(Run):
         """The mesh network. Raises InputError or ModelError."""
         return load_mesh(self.mesh)
 
-    def glance(self) -> LookCheckpoint | None:
-        """The network that judges the proposals first, if there is one. Raises InputError or ModelError."""
-        return LookCheckpoint.load(self.folder / _GLANCE) if _GLANCE in self.digests else None
-
-    def start(self) -> LookCheckpoint | None:
-        """The look network to begin with, if there is one. Raises InputError or ModelError."""
-        return LookCheckpoint.load(self.folder / _START) if _START in self.digests else None
-
-    def provenance(self) -> dict[str, str]:
-        """What a network of this training was made from, for its contract."""
-        start = {"start_sha256": self.digests[_START]} if _START in self.digests else {}
-        made_from = {"mesh_sha256": self.digests[self.mesh.name], "configuration_sha256": self.digests["look.toml"]}
-        return made_from | start
-
     @property
     def upright_radius(self) -> float:
         """Radius of the circles around bases [m]; 0 for a class of kind object."""
-        return upright_radius_of(self.configuration, self.object_class)
+        is_upright = self.configuration.classes.kinds[self.object_class] == "upright"
+        return self.configuration.patches.upright_radius if is_upright else 0.0
 
 
 def begin_look_run(
@@ -94,26 +78,18 @@ def begin_look_run(
     *,
     strict: bool = False,
     threads: int = 1,
-    glance: LookCheckpoint | None = None,
-    start: LookCheckpoint | None = None,
 ) -> LookRun:
-    """Write the files of a new training. model: file of the mesh network; name: as the user named it. glance: network
-    that goes before the new one. start: network to begin with, which fits the configuration.
+    """Write the files of a new training. model: file of the mesh network; name: as the user named it.
 
     Raises InputError, also if the folder holds a training, and ModelError.
     """
     check_unused(folder, _FILES)
     _ = configuration.shape
     object_class = class_to_judge(configuration, load_mesh(model), name)
-    if glance is not None:
-        check_glance(glance, object_class, upright_radius_of(configuration, object_class))
     make_folder(folder / "patches")
     write_split(folder / "pictures.json", split)
     mesh = f"mesh{model.suffix.lower()}"
     write_file(folder / mesh, read_bytes(model))
-    looks = {path: each for path, each in ((_GLANCE, glance), (_START, start)) if each is not None}
-    for path, each in looks.items():
-        each.save(folder / path)
     entries = {
         "data": str(data.resolve()),
         "mesh": mesh,
@@ -122,7 +98,7 @@ def begin_look_run(
         "strict": strict,
         "threads": threads,
     }
-    write_run(folder, "look", configuration, (mesh, *looks), entries)
+    write_run(folder, "look", configuration, (mesh,), entries)
     return read_look_run(folder)
 
 

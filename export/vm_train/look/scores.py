@@ -11,13 +11,16 @@ import torch
 from vm_embedded.arrays import Floats, Image, Mask, Singles
 from vm_export.look_network import LookNetwork
 
-from ..scores.calibration import Calibration, Reliability
-from ..scores.curves import PrecisionRecall, without_nan
-from .judging import Found
+from ..scores.calibration import Calibration
+from ..scores.curves import without_nan
+from ..scores.object_ranking import Ranking
 from .labels import OBJECT
 from .patch_set import PatchSet
 
 _BATCH = 1024
+
+_REPORTED = 0.5
+"""Probability from which objects count as reported in the result."""
 
 
 @torch.no_grad()
@@ -47,24 +50,14 @@ class LookScore:
     def of(cls, logits: Singles, patches: PatchSet) -> LookScore:
         """The scores of outputs (n, 4), as `logits_of` returns them."""
         right = patches.labels == OBJECT
-        precision = average_precision(logits[:, 0].astype(np.float64), right)
-        if not right.any():
+        presence, count = logits[:, 0].astype(np.float64), int(right.sum())
+        ranking = Ranking(confidence=presence, right=right, truths=count, pictures=0)
+        precision = ranking.precision_recall.average_precision
+        if not count:
             return cls(precision, np.nan, np.nan)
         errors = logits[right, 1:] - patches.targets[right]
         center = np.hypot(errors[:, 0], errors[:, 1])
         return cls(precision, float(np.median(center)), float(np.median(np.abs(errors[:, 2]))))
-
-
-def average_precision(confidence: Floats, right: Mask, truths: int | None = None) -> float:
-    """Average precision of answers with a confidence (n,), of which some are right (n,).
-
-    truths: number of right answers that are possible, if it is not that of the right ones. NaN if none is possible.
-    """
-    order = np.argsort(-confidence, kind="stable")
-    ranked, hits = confidence[order], np.cumsum(right[order], dtype=np.int64)
-    last = np.flatnonzero(np.diff(ranked, append=-np.inf))  # equal confidences count together
-    count = int(right.sum()) if truths is None else truths
-    return PrecisionRecall(ranked[last], hits[last] / (last + 1.0), hits[last] / max(count, 1), count).average_precision
 
 
 def balanced_loss(logits: Floats, shown: Mask) -> float:
@@ -76,59 +69,25 @@ def balanced_loss(logits: Floats, shown: Mask) -> float:
     return float(0.5 * losses[shown].mean() + 0.5 * losses[~shown].mean())
 
 
-@dataclass(frozen=True)
-class LookResult:
-    """How good what a network finds in the validation pictures is; result.json holds it.
+def result_in_words(found: Ranking) -> str:
+    """What a network finds in the validation pictures, with its calibrated probabilities."""
+    outcome = found.at(_REPORTED)
+    return (
+        f"in {found.pictures} validation pictures it finds {outcome.hits} of {found.truths} visible objects, and "
+        f"{outcome.false} false ones, at probability {_REPORTED:g}; average precision "
+        f"{found.precision_recall.average_precision:.3f}, calibration error {found.reliability.error:.3f}"
+    )
 
-    pictures, objects: number of pictures, and of visible objects in them. average_precision: of the objects that are
-    found, 0 to 1; objects that are not proposed lower it. hits, false: right and wrong ones with a calibrated
-    probability of at least 0.5. calibration_error: mean difference between probability and share of right ones, over
-    bins.
-    """
 
-    pictures: int
-    objects: int
-    average_precision: float
-    hits: int
-    false: int
-    calibration: Calibration
-    reliability: Reliability
-
-    @classmethod
-    def of(cls, found: Found, calibration: Calibration) -> LookResult:
-        """The result with a calibration."""
-        probabilities = calibration.probabilities(found.logits)
-        reported = probabilities >= 0.5
-        return cls(
-            found.pictures,
-            found.objects,
-            average_precision(found.logits, found.right, found.objects),
-            int((reported & found.right).sum()),
-            int((reported & ~found.right).sum()),
-            calibration,
-            Reliability.of(probabilities, found.right),
-        )
-
-    @property
-    def calibration_error(self) -> float:
-        """Expected calibration error; NaN if nothing was found."""
-        return self.reliability.error
-
-    def __str__(self) -> str:
-        return (
-            f"in {self.pictures} validation pictures it finds {self.hits} of {self.objects} visible objects, and "
-            f"{self.false} false ones, at probability 0.5; average precision {self.average_precision:.3f}, calibration "
-            f"error {self.calibration_error:.3f}"
-        )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON; None for what has no value."""
-        values = {"average_precision": self.average_precision, "calibration_error": self.calibration_error}
-        return {
-            "pictures": self.pictures,
-            "objects": self.objects,
-            **without_nan(values),
-            "at_probability_0.5": {"hits": self.hits, "false": self.false},
-            "calibration": asdict(self.calibration),
-            "bins": self.reliability.rows(),
-        }
+def result_values(found: Ranking, calibration: Calibration) -> dict[str, Any]:
+    """The same for result.json. Objects that are not proposed lower the average precision."""
+    outcome, reliability = found.at(_REPORTED), found.reliability
+    precision = found.precision_recall.average_precision
+    return {
+        "pictures": found.pictures,
+        "objects": found.truths,
+        **without_nan({"average_precision": precision, "calibration_error": reliability.error}),
+        f"at_probability_{_REPORTED:g}": {"hits": outcome.hits, "false": outcome.false},
+        "calibration": asdict(calibration),
+        "bins": reliability.rows(),
+    }

@@ -6,22 +6,14 @@ import torch
 
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.look_contract import LookContract
-from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork
 
 
 class TorchLook:
-    """A look network, its contract, and its glance, if it has one."""
+    """A look network and its contract."""
 
-    def __init__(self, network: LookNetwork, contract: LookContract, glance: TorchLook | None = None) -> None:
-        self._network, self.contract, self.glance = network.eval(), contract, glance
-
-    @classmethod
-    def of(cls, glance: LookCheckpoint | None) -> TorchLook | None:
-        """The network of a glance's checkpoint, with its own glance, if it has one."""
-        if glance is None:
-            return None
-        return cls(glance.network, glance.contract, cls.of(glance.glance))
+    def __init__(self, network: LookNetwork, contract: LookContract) -> None:
+        self._network, self.contract = network.eval(), contract
 
     def run(self, patches: Image) -> Singles:
         """Answers (n, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them.

@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from itertools import groupby
 
 import numpy as np
 import torch
@@ -24,43 +23,46 @@ from ..runs.hardware import Hardware
 from ..runs.learner import DivergedError
 from ..runs.loop import Progress, Training, Validation, shown
 from ..scores.calibration import Calibration
-from .judging import judge_validation
+from ..scores.object_ranking import Ranking
 from .labels import OBJECT
 from .patch_set import PatchSet
 from .run import LookRun
-from .scores import LookResult, LookScore, logits_of
+from .scores import LookScore, logits_of, result_in_words, result_values
 from .trainer import LookTrainer
 from .training_patches import TrainingPatches, collect
+from .validation import judge_validation
 
 _EXAMPLES = 2
 """Patches with an object, and as many without, for the self-test of the model file."""
 
 
 class LookTraining(Training):
-    """See runs.loop.Training. Each round goes on with the network of the one before, which grades the patches first."""
+    """See runs.loop.Training. Before some epochs, the network grades the patches."""
 
     run: LookRun
     learner: LookTrainer
     _patches: TrainingPatches
 
     def __init__(self, run: LookRun, hardware: Hardware) -> None:
-        self.run, self._hardware, recipe = run, hardware, run.configuration.training
-        self._rounds = [list(each) for _, each in groupby(range(recipe.epochs), recipe.round_of)]
+        self.run, self._hardware, self.epochs = run, hardware, run.configuration.training.epochs
         super().__init__()
-        self.rounds, self.epochs, self.steps = len(self._rounds), range(0), 0
 
     def begin(self, progress: Progress, stopped: Callable[[], bool]) -> None:
-        """Collect the patches and prepare the network, unless the round before did."""
-        epochs = self._rounds[progress.round - 1]
-        self._progress, self._stopped, self.epochs = progress, stopped, range(epochs[0], epochs[-1] + 1)
-        if not self.steps:
-            self._patches = collect(self.run, self._hardware.workers, stopped)
-            self._describe()
-            self._prepare()
+        """Collect the patches and prepare the network."""
+        configuration, recipe, self._stopped = self.run.configuration, self.run.configuration.training, stopped
+        self._patches = collect(self.run, self._hardware.workers, stopped)
+        self._describe()
+        self.steps = -(-len(self._patches.training) // recipe.batch)
+        torch.manual_seed(recipe.seed)
+        network, extent = LookNetwork(configuration.shape), configuration.patches.extent
+        augmentation, device = configuration.augmentation, self._hardware.device
+        total = recipe.epochs * self.steps
+        self.learner = LookTrainer(network, self._patches.training, extent, recipe, augmentation, total, device=device)
 
     def step(self) -> dict[str, float]:
         """Learn from the next batch."""
-        if self.epochs.start and self.learner.done == self.epochs.start * self.steps:
+        epoch, done = divmod(self.learner.done, self.steps)
+        if not done and self.run.configuration.training.begins_round(epoch):
             self.learner.grade()
         return self.learner.step()
 
@@ -70,38 +72,22 @@ class LookTraining(Training):
         return Validation(asdict(score), *_in_words(score))
 
     def finish(self) -> None:
-        """After the last round, calibrate the network on what it finds in the validation pictures; write look.pt."""
-        if self._progress.round < self.rounds:
-            return
+        """Calibrate the network on what it finds in the validation pictures; write look.pt."""
         run, network, contract = self.run, self.learner.network.cpu().eval(), self._contract()
         round_kernels(network)
         with shown(len(run.split.validation), self._stopped) as report:
             found = judge_validation(run, network, contract, self._hardware.workers, report)
-        calibration = Calibration.fit(found.logits, found.right)
-        result = LookResult.of(found, calibration)
+        calibration = Calibration.fit(found.confidence, found.right)
+        result = replace(found, confidence=calibration.probabilities(found.confidence))
         logits = self._answers()
         score = LookScore.of(logits, self._patches.validation)
         contract = replace(contract, provenance=self._provenance(score, result))
         examples = _examples(self._patches.validation, logits[:, 0])
-        look = LookCheckpoint(network, contract, examples, run.glance())
+        look = LookCheckpoint(network, contract, examples)
         source = f"{len(run.split.validation)} validation pictures of {printable(run.data.name)}"
         look.recalibrated(calibration.scale, calibration.offset, source).save(run.result_path)
-        write_file(run.folder / "result.json", json.dumps(result.as_dict(), indent=1) + "\n")
-        print(f"{run.result_path}: {result}")
-
-    def _prepare(self) -> None:
-        """Make the network, from random weights or from those of a trained one."""
-        configuration, recipe = self.run.configuration, self.run.configuration.training
-        self.steps = -(-len(self._patches.training) // recipe.batch)
-        torch.manual_seed(recipe.seed)
-        network = LookNetwork(configuration.shape)
-        start = self.run.start()
-        if start is not None:
-            network.load_state_dict(start.network.state_dict())
-            network.calibration.copy_(torch.tensor([1.0, 0.0]))  # the end of the training sets it again
-        extent, augmentation = configuration.patches.extent, configuration.augmentation
-        total, device = recipe.epochs * self.steps, self._hardware.device
-        self.learner = LookTrainer(network, self._patches.training, extent, recipe, augmentation, total, device=device)
+        write_file(run.folder / "result.json", json.dumps(result_values(result, calibration), indent=1) + "\n")
+        print(f"{run.result_path}: {result_in_words(result)}")
 
     def _answers(self) -> Singles:
         """Outputs (n, 4) for the patches of the validation. Raises DivergedError if some are NaN or infinite."""
@@ -118,26 +104,23 @@ class LookTraining(Training):
         training, validation = found.training, found.validation
         print(f"training: {len(training)} patches, {training.objects} of them show the object {name}")
         print(f"validation: {len(validation)} proposals, {validation.objects} of them show the object {name}")
-        proposer = "the mesh network proposes" if self.run.glance() is None else "the glance passes on"
         share = 100.0 * found.proposed / found.objects if found.objects else math.nan
-        print(f"{proposer} {found.proposed} of {found.objects} visible objects ({share:.0f} %)")
+        print(f"the mesh network proposes {found.proposed} of {found.objects} visible objects ({share:.0f} %)")
         print("validation AP: average precision of the validation proposals, from 0 to 1", flush=True)
 
     def _contract(self) -> LookContract:
         """The contract of the network, without provenance."""
-        run, patches, glance = self.run, self.run.configuration.patches, self.run.glance()
+        run, patches = self.run, self.run.configuration.patches
         return LookContract(
             object_class=run.object_class,
             upright_radius=run.upright_radius,
             size=patches.size,
             extent=patches.extent,
-            above=patches.above,
-            passes=patches.passes,
+            max_proposals=patches.max_proposals,
             channels=run.configuration.network.channels,
-            glance=None if glance is None else glance.contract,
         )
 
-    def _provenance(self, score: LookScore, result: LookResult) -> dict[str, str]:
+    def _provenance(self, score: LookScore, result: Ranking) -> dict[str, str]:
         """Where the network comes from, for its contract."""
         run, found, recipe = self.run, self._patches, self.run.configuration.training
         return {
@@ -148,15 +131,16 @@ class LookTraining(Training):
             "validation_pictures": str(len(run.split.validation)),
             "validation_proposals": str(len(found.validation)),
             "patches_sha256": found.training.sha256(),
-            **run.provenance(),
+            "mesh_sha256": run.digests[run.mesh.name],
+            "look_toml_sha256": run.digests["look.toml"],
             "epochs": str(recipe.epochs),
             "rounds": str(recipe.rounds),
             "seed": str(recipe.seed),
             "patches_seed": str(run.configuration.patches.seed),
             "validation_average_precision": f"{score.average_precision:.4f}",
             "validation_center_error": f"{score.center_error:.4f}",
-            "objects_average_precision": f"{result.average_precision:.4f}",
-            "calibration_error": f"{result.calibration_error:.4f}",
+            "objects_average_precision": f"{result.precision_recall.average_precision:.4f}",
+            "calibration_error": f"{result.reliability.error:.4f}",
             "torch": str(torch.__version__),
         }
 

@@ -67,14 +67,13 @@ class Validation:
 class Training(ABC):
     """A kind of training. The loop calls `begin`, then `step` and `validate` in turn, and `finish`, for each round.
 
-    rounds: their number. epochs: those of the round, counted from 0; a round that goes on with the network of the one
-    before also goes on with its epochs. steps: of an epoch. patience: the round ends after this many epochs without a
-    better score; 0 for never. title: what to print before the number of an epoch. kept: plain values and tensors that
-    belong to the state. held: what a round must release at its end.
+    rounds: their number. epochs: of a round, at most. steps: of an epoch. patience: the round ends after this many
+    epochs without a better score; 0 for never. title: what to print before the number of an epoch. kept: plain values
+    and tensors that belong to the state. held: what a round must release at its end.
     """
 
-    rounds: int
-    epochs: range
+    rounds = 1
+    epochs: int
     steps: int
     patience = 0
     title = ""
@@ -87,7 +86,7 @@ class Training(ABC):
 
     @abstractmethod
     def begin(self, progress: Progress, stopped: Callable[[], bool]) -> None:
-        """Prepare a round: set `epochs`, `steps`, `title` and `learner`. The loop changes `progress` from now on.
+        """Prepare a round: set `steps`, `title` and `learner`. The loop changes `progress` from now on.
 
         stopped: whether to stop, by raising KeyboardInterrupt; all processes must call it the same number of times.
         """
@@ -127,7 +126,7 @@ def train(training: Training, hardware: Hardware, stop_requested: Callable[[], b
             training.finish()
         finally:
             training.held.close()
-        progress = Progress(progress.round + 1, training.epochs.stop, best_ever=progress.best_ever)
+        progress = Progress(progress.round + 1, best_ever=progress.best_ever)
         state = None
     _save(training, hardware, progress)
     return True
@@ -144,9 +143,7 @@ class _Round:
     def run(self, state: dict[str, Any] | None) -> None:
         """Train from a state on; None: from the beginning of the round."""
         training, progress = self._training, self._progress
-        if state is None:
-            progress.validated = training.epochs.start
-        else:
+        if state is not None:
             training.learner.load(state)
             training.kept = dict(state["kept"])
         learner = training.learner
@@ -156,7 +153,7 @@ class _Round:
         )
         try:
             with log, self._saved_on_error():
-                while progress.validated < training.epochs.stop and not self._is_late():
+                while progress.validated < training.epochs and not self._is_late():
                     self._validate(log, self._learn(log))
         finally:
             self._bar.clear()

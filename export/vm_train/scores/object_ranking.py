@@ -68,6 +68,20 @@ class Ranking:
     truths: int
     pictures: int
 
+    @classmethod
+    def empty(cls) -> Ranking:
+        """Of no pictures."""
+        return Ranking(confidence=np.empty(0), right=np.empty(0, dtype=np.bool_), truths=0, pictures=0)
+
+    def __add__(self, other: Ranking) -> Ranking:
+        """What was found in the pictures of both."""
+        return Ranking(
+            confidence=np.concatenate([self.confidence, other.confidence]),
+            right=np.concatenate([self.right, other.right]),
+            truths=self.truths + other.truths,
+            pictures=self.pictures + other.pictures,
+        )
+
     @cached_property
     def precision_recall(self) -> PrecisionRecall:
         """The curve over all confidences (paper: fig:pr_curve).

@@ -22,6 +22,7 @@ from vm_embedded.errors import InputError
 
 from .curves import ratio, without_nan
 from .distance_bins import bins_of, checked_edges, named_bins
+from .object_ranking import Ranking
 
 FIELD_EDGES: Floats = np.linspace(0.0, 10.0, 6)
 """Edges of the distance bins of field features [m]."""
@@ -123,11 +124,16 @@ class UprightScores:
             return np.ones(len(distances), dtype=bool)
         return np.asarray(bins_of(distances, self.edges) == distance_bin)
 
-    def judged(self) -> tuple[npt.NDArray[np.float64], Mask]:
-        """Confidences (n,) of the reports that are found bases or false, and whether each is a found one (n,)."""
+    def ranking(self) -> Ranking:
+        """The reports that are found bases or false, at all distances."""
         _, outcomes, confidences = self._tables[1].T
         counts = np.isin(outcomes, (_FOUND, _FALSE))
-        return confidences[counts], outcomes[counts] == _FOUND
+        return Ranking(
+            confidence=confidences[counts],
+            right=outcomes[counts] == _FOUND,
+            truths=len(self._truths),
+            pictures=self.pictures,
+        )
 
     @property
     def _tables(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

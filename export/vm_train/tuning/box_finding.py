@@ -83,9 +83,9 @@ class Trial:
             lowest = min(self.settings.min_confidence, _LOWEST)
             settings = replace(self.settings, min_confidence=lowest, field_features=False)
             return partial(_found_by_detector, Detector(model, settings), judged_class(model.manifest, self.name))
-        look = CloseLook.of(model)
-        assert look is not None
-        return partial(_found_by_look, look, self.search)
+        name = model.manifest.searched_class
+        assert name is not None
+        return partial(_found_by_look, CloseLook.of(model)[name], self.search)
 
     def scores(self, frames: Sequence[BoxedPicture], name: str, workers: int, report: Callable[[], None]) -> BoxScores:
         """The scores for a class. workers: processes. report: is called after each frame. Raises as a Finder does."""
@@ -98,8 +98,8 @@ class Trial:
 
 def judged_class(manifest: Manifest, model: str) -> str:
     """The class of objects that is scored: that of the close look, or the only one. Raises InputError for several."""
-    if manifest.look is not None:
-        return manifest.look.object_class
+    if manifest.searched_class is not None:
+        return manifest.searched_class
     names = [each.name for each in manifest.classes if each.kind == "object"]
     if len(names) != 1:
         raise InputError(f"{model} has no close look and {len(names)} classes of objects: boxes score one class")

@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
-from vm_embedded.detection.looking import Look, chain_of, look_at
+from vm_embedded.detection.looking import Look
 from vm_embedded.detection.peaks import LARGEST_SIZE
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
 
-from .windows import WindowPlaces, Windows, grid_windows
+from .windows import Windows, grid_windows
 
 _FACTOR = 1.4
 """Ratio of two neighboring sizes; a network still knows an object that is 4/3 of the expected size."""
@@ -40,9 +40,8 @@ def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, abo
     size: of the frame [px]. radii (s,): to look for [px]. above: lowest probability of a candidate. most: number of
     candidates. Of candidates that overlap, the better one stays. Raises ModelError if the network does not run.
     """
-    first = chain_of(look)[0]
     windows = grid_windows(size, radii)
-    answers = first.run(windows.cut(pyramid, first.contract)).astype(np.float64)
+    answers = look.run(windows.cut(pyramid, look.contract)).astype(np.float64)
     likely = np.flatnonzero((answers[:, 0] > above) & (np.abs(answers[:, 3]) < _UNLIKE))
     likely = likely[np.argsort(-answers[likely, 0], kind="stable")]
     found = windows.part(likely).moved(answers[likely, 1], answers[likely, 2])
@@ -52,16 +51,16 @@ def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, abo
 def seen_objects(
     pyramid: Pyramid, size: Size, look: Look, radii: Floats, above: float, most: int
 ) -> tuple[Windows, Floats]:
-    """The objects that a network sees at its candidates after all its looks, the most probable first, each once.
+    """The objects that a network sees at its candidates, the most probable first, each once.
 
     Their places and sizes are those that it sees. Also returns its probabilities (n,). Arguments and errors: see
     `find_candidates`.
     """
-    places = WindowPlaces(pyramid, find_candidates(pyramid, size, look, radii, above, most))
-    answers = look_at(places, look).astype(np.float64)
+    candidates = find_candidates(pyramid, size, look, radii, above, most)
+    answers = look.run(candidates.cut(pyramid, look.contract)).astype(np.float64)
     order = np.argsort(-answers[:, 0], kind="stable")
     scale = np.exp(np.clip(answers[:, 3], -LARGEST_SIZE, LARGEST_SIZE))
-    seen = Windows(places.windows.centers, places.windows.radii * scale).part(order)
+    seen = Windows(candidates.moved(answers[:, 1], answers[:, 2]).centers, candidates.radii * scale).part(order)
     kept = _apart(seen, most)
     return seen.part(kept), answers[order[kept], 0]
 

@@ -11,7 +11,6 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.pyramid import Pyramid
-from vm_embedded.network.look_contract import LookContract
 
 from ..boxes.box import BoxedPicture
 from ..look.chunks import collect_chunks
@@ -22,43 +21,33 @@ from ..look.torch_look import TorchLook
 from .boxed_objects import objects_of
 from .candidates import find_candidates
 from .configuration import WindowSettings
-from .run import TuningRun
+from .run import TuningRun, tuned_look
 from .windows import Windows, jittered_windows, random_windows
 
 CHUNK = 20
 """Frames in a file of patches."""
 
 
-@dataclass(frozen=True)
-class Frame:
-    """A boxed frame and its position in the run's list."""
-
-    picture: BoxedPicture
-    position: int
-
-
 @dataclass(frozen=True, eq=False)
 class WindowCollector:
-    """Cuts the patches of a frame. contract: of the network that learns from them. radii (s,): of objects [px]."""
+    """Cuts the patches of a frame. look: the network before the fine-tuning. radii (s,): of objects [px]."""
 
     look: TorchLook
-    contract: LookContract
     settings: WindowSettings
     radii: Floats
     object_class: str
     is_round: bool
 
     @classmethod
-    def of(cls, run: TuningRun, stage: str) -> WindowCollector:
-        """The collector of a stage. Raises InputError or ModelError."""
-        before = run.network_before(stage)
-        look = TorchLook(before.network, before.contract, TorchLook.of(before.glance))
-        settings = run.configuration.patches
-        return cls(look, before.contract, settings, run.radii, run.object_class, run.is_round)
+    def of(cls, run: TuningRun) -> WindowCollector:
+        """The collector of a run. Raises InputError or ModelError."""
+        before = tuned_look(run.before)
+        look = TorchLook(before.network, before.contract)
+        return cls(look, run.configuration.patches, run.radii, run.object_class, run.is_round)
 
-    def __call__(self, frame: Frame) -> PatchChunk:
-        """The patches of a frame. Raises InputError if it can't be read any more."""
-        picture, settings = frame.picture, self.settings
+    def __call__(self, frame: tuple[int, BoxedPicture]) -> PatchChunk:
+        """The patches of a frame, given with its number. Raises InputError if it can't be read any more."""
+        (number, picture), settings = frame, self.settings
         pyramid = Pyramid(read_image(picture.image), "bgr")
         objects = objects_of(picture, self.object_class, self.is_round)
         random = random_of(settings.seed, picture.image.name)
@@ -69,19 +58,18 @@ class WindowCollector:
         )
         found = windows.label(objects)
         clear = found.labels != UNLABELED
-        patches = windows.part(clear).cut(pyramid, self.contract)
-        pictures = np.full(len(patches), frame.position, dtype=np.int32)
+        patches = windows.part(clear).cut(pyramid, self.look.contract)
+        pictures = np.full(len(patches), number, dtype=np.int32)
         return PatchChunk(PatchSet(patches, found.labels[clear], found.targets[clear], pictures))
 
 
-def collect_windows(run: TuningRun, stage: str, workers: int, report: Callable[[int], None]) -> PatchSet:
-    """Collect the patches of all frames for a stage, or read those that are collected.
+def collect_windows(run: TuningRun, workers: int, report: Callable[[int], None]) -> PatchSet:
+    """Collect the patches of all frames, or read those that are collected.
 
     workers: processes; 1 uses only this process. report: is called with the number of frames that are done. Raises
     InputError, and VisualMeshError if a worker was killed.
     """
-    frames = [Frame(picture, position) for position, picture in enumerate(run.pictures)]
-    make = partial(WindowCollector.of, run, stage)
-    paths = collect_chunks(frames, make, CHUNK, run.folder / "patches", f"{stage}-", workers, report)
-    size = run.network_before(stage).contract.size
+    frames, make, folder = list(enumerate(run.pictures)), partial(WindowCollector.of, run), run.folder / "patches"
+    paths = collect_chunks(frames, make, CHUNK, folder, workers, report)
+    size = tuned_look(run.before).contract.size
     return PatchSet.joined(size, [PatchChunk.load(path).patches for path in paths])

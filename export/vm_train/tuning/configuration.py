@@ -72,23 +72,21 @@ class TuningRecipe:
     batch: int = number(256, "patches in a step", "", (2, 1e5))
     positives: float = number(0.33, "share of each batch that shows an object", "", (0.01, 0.99))
     rate: float = number(1e-3, "highest learning rate; it rises once, then falls (one cycle)", "", (1e-9, 1e3))
-    glance_rate: float = number(3e-3, "the same for the glance, which is smaller", "", (1e-9, 1e3))
     decay: float = number(0.02, "weight decay", "", (0.0, 1.0))
     seed: int = number(0, "seed of batches and augmentation", "", (0, 2**31))
 
     def __post_init__(self) -> None:
         check_entries(self)
 
-    def for_stage(self, stage: str) -> LookRecipe:
-        """The recipe of a trainer: of the glance, or of the look itself."""
-        rate = self.glance_rate if stage == "glance" else self.rate
+    def as_look_recipe(self) -> LookRecipe:
+        """The recipe of a trainer."""
         return LookRecipe(
             epochs=self.epochs,
             rounds=1,
             batch=self.batch,
             positives=self.positives,
             optimizer="adamw",
-            rate=rate,
+            rate=self.rate,
             decay=self.decay,
             seed=self.seed,
         )

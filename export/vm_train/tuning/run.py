@@ -2,9 +2,8 @@
 
 tune.toml: the configuration. run.json: where the boxes are. before.onnx: the model file that it began with.
 rendered.npz: rendered patches. pictures.json: the frames of each part. patches/: patches of the user's frames.
-glance.pt, look.pt: the networks, when they are trained. state.pt: the state to resume from. log.jsonl, tensorboard/:
-the record of each step; round 1 is the glance. model.onnx: the new model file. report.html, result.json: what both
-networks find in the held-out frames.
+look.pt: the network, when it is trained. state.pt: the state to resume from. log.jsonl, tensorboard/: the record of
+each step. model.onnx: the new model file. report.html, result.json: what both networks find in the held-out frames.
 """
 
 from __future__ import annotations
@@ -15,13 +14,12 @@ from pathlib import Path
 
 from vm_embedded.arrays import Floats
 from vm_embedded.config.sections import read_sections
-from vm_embedded.errors import InputError
+from vm_embedded.errors import InputError, ModelError
 from vm_embedded.files import write_file
-from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
-from vm_export.look_weights import look_of
+from vm_export.look_weights import looks_of
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
@@ -32,12 +30,9 @@ from .candidates import search_radii
 from .configuration import TuningConfiguration
 from .rendered_sample import check_rendered, write_rendered_for
 
-GLANCE, LOOK = "glance", "look"
-"""The networks of a fine-tuning."""
-
 _FILES = (
-    *("tune.toml", "before.onnx", "rendered.npz", "patches", "glance.pt", "look.pt", "model.onnx"),
-    *("report.html", "result.json"),
+    *("tune.toml", "before.onnx", "rendered.npz", "patches", "look.pt", "model.onnx", "report.html"),
+    "result.json",
 )
 """Files that a new fine-tuning would overwrite, besides those of all trainings."""
 
@@ -91,38 +86,16 @@ class TuningRun(Run):
         return self.folder / "model.onnx"
 
     @property
-    def stages(self) -> tuple[str, ...]:
-        """The networks to train, in order: first the glance, which sees every proposal."""
-        return (LOOK,) if self.contract.glance is None else (GLANCE, LOOK)
-
-    def stage_path(self, stage: str) -> Path:
-        """File of a trained network."""
-        return self.folder / f"{stage}.pt"
-
-    def network_before(self, stage: str) -> LookCheckpoint:
-        """The network that a stage begins with: the glance; or the look, behind the glance that is fine-tuned.
-
-        Raises InputError or ModelError.
-        """
-        before = tuned_look(self.before)
-        if before.glance is None:
-            return before
-        if stage == GLANCE:
-            return before.glance
-        glance = LookCheckpoint.load(self.stage_path(GLANCE))
-        return replace(before, contract=replace(before.contract, glance=glance.contract), glance=glance)
-
-    @property
-    def contract(self) -> LookContract:
-        """The contract of the look network that it began with; see `tuned_look`."""
-        look = self.before.manifest.look
-        assert look is not None  # begin_tuning refuses a model file without one
-        return look.chain[1] if look.is_wide else look
+    def look_path(self) -> Path:
+        """File of the trained network."""
+        return self.folder / "look.pt"
 
     @property
     def object_class(self) -> str:
-        """The class that the networks judge."""
-        return self.contract.object_class
+        """The class that the network judges."""
+        name = self.before.manifest.searched_class
+        assert name is not None  # begin_tuning refuses a model file without such a look
+        return name
 
     @property
     def is_round(self) -> bool:
@@ -140,13 +113,11 @@ class TuningRun(Run):
 
 
 def tuned_look(model: ModelFile) -> LookCheckpoint:
-    """The close look of a model file, which a fine-tuning changes. A wide look behind it is left out: it would not
-    know the new objects, and there are no rendered patches for it, without which it would forget the others.
-
-    Raises ModelError if the file has no look.
-    """
-    look = look_of(model)
-    return look.glance if look.glance is not None and look.contract.is_wide else look
+    """The close look at objects of a model file, which a fine-tuning changes. Raises ModelError if it has none."""
+    for each in looks_of(model):
+        if each.contract.object_class == model.manifest.searched_class:
+            return each
+    raise ModelError(f"{model.path} has no close look at objects; vm-export --look attaches one")
 
 
 def begin_tuning(

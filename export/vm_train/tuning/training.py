@@ -1,6 +1,6 @@
-"""Fine-tunes the close look of a model file on boxed frames, stage by stage.
+"""Fine-tunes the close look of a model file on boxed frames.
 
-In each stage a network learns from the user's patches and from rendered ones, and the best epoch stays. Patches without
+It learns from the user's patches and from rendered ones, and the best epoch stays. Patches without
 an object are drawn by the network's errors, which it learns at the beginning and in the middle.
 """
 
@@ -34,15 +34,15 @@ from .boxed_objects import divided
 from .collection import collect_windows
 from .mixing import Mixer
 from .rendered_patches import read_rendered
-from .run import LOOK, TuningRun
+from .run import TuningRun, tuned_look
 
 _RENDERED_VALIDATION = 5
 """One of so many rendered patches is for validation."""
 
 
 @dataclass(frozen=True, eq=False)
-class StagePatches:
-    """Patches of a stage: the user's own and rendered ones, each for training and for validation."""
+class TuningPatches:
+    """Patches of a fine-tuning: the user's own and rendered ones, each for training and for validation."""
 
     own: PatchSet
     rendered: PatchSet
@@ -50,7 +50,7 @@ class StagePatches:
     rendered_validation: PatchSet
 
     @classmethod
-    def of(cls, run: TuningRun, own: PatchSet, rendered: PatchSet) -> StagePatches:
+    def of(cls, run: TuningRun, own: PatchSet, rendered: PatchSet) -> TuningPatches:
         """Divide patches by the run's split."""
         validates = np.isin(own.pictures, np.array(run.split.validation, dtype=np.int64))
         shared = np.arange(len(rendered)) % _RENDERED_VALIDATION == 0
@@ -69,7 +69,7 @@ class StagePatches:
 
 
 class Tuning(Training):
-    """See runs.loop.Training. A round is a stage; `kept` is the network of its best epoch."""
+    """See runs.loop.Training. `kept` is the network of its best epoch."""
 
     run: TuningRun
     learner: LookTrainer
@@ -77,18 +77,16 @@ class Tuning(Training):
     def __init__(self, run: TuningRun, hardware: Hardware) -> None:
         self.run, self._workers, recipe = run, hardware.workers, run.configuration.training
         super().__init__()
-        self.rounds, self.patience = len(run.stages), recipe.patience
-        self.epochs, self.steps = range(recipe.epochs), recipe.steps
+        self.epochs, self.steps, self.patience = recipe.epochs, recipe.steps, recipe.patience
 
     def begin(self, progress: Progress, stopped: Callable[[], bool]) -> None:
-        """Collect the patches of a stage, and prepare its network."""
+        """Collect the patches, and prepare the network."""
         run, settings, recipe = self.run, self.run.configuration, self.run.configuration.training
-        self._progress, self._stopped, self._stage = progress, stopped, run.stages[progress.round - 1]
-        self.title = f"{self._stage}, "
-        self._before = before = run.network_before(self._stage)
+        self._progress, self._stopped = progress, stopped
+        self._before = before = tuned_look(run.before)
         with shown(len(run.pictures), stopped) as report:
-            own = collect_windows(run, self._stage, self._workers, report)
-        self._patches = patches = StagePatches.of(run, own, read_rendered(run.rendered_path, before.contract.size))
+            own = collect_windows(run, self._workers, report)
+        self._patches = patches = TuningPatches.of(run, own, read_rendered(run.rendered_path, before.contract.size))
         self._digest = own.sha256()
         training, weights = patches.for_training(recipe.own)
         network, old = copy.deepcopy(before.network), before.network.eval()
@@ -99,7 +97,7 @@ class Tuning(Training):
             network,
             training,
             before.contract.extent,
-            recipe.for_stage(self._stage),
+            recipe.as_look_recipe(),
             settings.augmentation,
             recipe.epochs * recipe.steps,
             weights,
@@ -107,12 +105,11 @@ class Tuning(Training):
         )
         self.kept = _copy(network)
         mine = patches.own
-        shows = f"{len(mine)} patches of your frames, {mine.objects} of them show the object"
-        print(f"{self._stage}: {shows}", flush=True)
+        print(f"{len(mine)} patches of your frames, {mine.objects} of them show the object", flush=True)
 
     def step(self) -> dict[str, float]:
         """Learn from the next batch."""
-        if self.learner.done in (0, self.epochs.stop // 2 * self.steps):
+        if self.learner.done in (0, self.epochs // 2 * self.steps):
             self.learner.grade()
         return self.learner.step()
 
@@ -134,17 +131,15 @@ class Tuning(Training):
         )
 
     def finish(self) -> None:
-        """Write the network of the best epoch; after the last stage, also the model file and the report."""
+        """Write the network of the best epoch, the model file and the report."""
         before, network = self._before, self.learner.network.eval()
         network.load_state_dict(self.kept)
-        if self._stage == LOOK:
-            before = replace(before, contract=replace(before.contract, provenance=self._provenance()))
-        look = replace(before, network=network)
-        look.save(self.run.stage_path(self._stage))
-        if self._stage == LOOK:
-            content, _ = attached(self.run.before.content, self.run.before.manifest, look)
-            write_file(self.run.result_path, content)
-            self._measure()
+        contract = replace(before.contract, provenance=self._provenance())
+        look = replace(before, network=network, contract=contract)
+        look.save(self.run.look_path)
+        content, _ = attached(self.run.before.content, self.run.before.manifest, look)
+        write_file(self.run.result_path, content)
+        self._measure()
 
     def _provenance(self) -> dict[str, str]:
         """Where the network comes from, for its contract."""

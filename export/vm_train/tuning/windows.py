@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Image, Mask
 from vm_embedded.detection.patches import cut_patches
-from vm_embedded.detection.places import NEAR
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
 from vm_embedded.network.look_contract import LookContract
@@ -54,11 +53,11 @@ class Windows:
         """The windows after shifts (n,) in expected radii."""
         return Windows(self.centers + np.stack([right, down], axis=1) * self.radii[:, None], self.radii)
 
-    def cut(self, pyramid: Pyramid, contract: LookContract, zoom: float = 1.0) -> Image:
-        """Patches (n, size, size, 3), RGB, of a frame, as a network needs them. zoom: see places.Places."""
+    def cut(self, pyramid: Pyramid, contract: LookContract) -> Image:
+        """Patches (n, size, size, 3), RGB, of a frame, as a network needs them."""
         if not len(self):
             return np.empty((0, contract.size, contract.size, 3), dtype=np.uint8)
-        reach = zoom * contract.extent * self.radii[:, None, None]
+        reach = contract.extent * self.radii[:, None, None]
         x = self.centers[:, 0, None, None] + reach * _CORNERS
         y = self.centers[:, 1, None, None] + reach * _CORNERS.T
         nodes = np.stack([x, y]).astype(np.float32)
@@ -79,37 +78,6 @@ class Windows:
         shift = objects.centers - self.centers[:, None]
         larger = np.maximum(self.radii[:, None], objects.radii)
         return np.asarray((np.hypot(shift[..., 0], shift[..., 1]) > larger).all(axis=1))
-
-
-class WindowPlaces:
-    """Windows of a frame as places for looking.look_at; `windows` moves to where an object was seen."""
-
-    def __init__(self, pyramid: Pyramid, windows: Windows) -> None:
-        self.windows = Windows(windows.centers.copy(), windows.radii)
-        self._pyramid = pyramid
-
-    def __len__(self) -> int:
-        return len(self.windows)
-
-    def cut(self, rows: npt.NDArray[np.intp], contract: LookContract, zoom: float = 1.0) -> Image:
-        """See places.Places."""
-        return self.windows.part(rows).cut(self._pyramid, contract, zoom)
-
-    def radii(self, rows: npt.NDArray[np.intp]) -> Floats:
-        """See places.Places."""
-        return self.windows.radii[rows]
-
-    def near(self, rows: npt.NDArray[np.intp]) -> Mask:
-        """See places.Places. Windows of objects of another size show another object."""
-        windows = self.windows.part(rows)
-        shift = windows.centers - windows.centers[:, None]
-        radii = windows.radii[:, None]
-        return (np.hypot(shift[..., 0], shift[..., 1]) < NEAR * radii) & np.isclose(radii, windows.radii)
-
-    def move(self, rows: npt.NDArray[np.intp], right: Floats, down: Floats) -> Mask:
-        """See places.Places. An object may be anywhere."""
-        self.windows.centers[rows] = self.windows.part(rows).moved(right, down).centers
-        return np.ones(len(rows), dtype=np.bool_)
 
 
 def jittered_windows(

@@ -69,7 +69,7 @@ def test_tuned_settings_are_printed_as_vm_detect_reads_them(tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--model", "ball-smaller"), "did you mean 'ball-small'"),
+        (("--model", "baller"), "did you mean 'ball'"),
         (("--model", "nowhere.onnx"), "nowhere.onnx"),
         (("--model", MODEL, "--size", "640"), "640x512"),
         (("--model", MODEL, "--size", "\u00b2x\u00b2"), "640x512"),

@@ -10,7 +10,7 @@ from .commands import one_complaint, run
 from .test_detect_files import DEMO
 
 PICTURES = sorted(DEMO.parent.glob("image*.jpg"))
-NOTHING = ("--model", "ball-small", "--min-confidence", 1)
+NOTHING = ("--model", "ball", "--min-confidence", 1)
 """Every proposal is rejected."""
 
 

@@ -12,10 +12,10 @@ from .test_detect_files import DEMO
 
 def test_the_radius_that_would_fit_is_named_after_all_frames():
     folder = DEMO.parent
-    said = run(folder, "--model", "ball-small", "--object-radius", 0.075).stderr
+    said = run(folder, "--model", "ball", "--object-radius", 0.075).stderr
     radius = float(said.split("0.075; ")[1].split(" would fit")[0])
     assert radius == pytest.approx(0.095, abs=0.004)
-    assert run(folder, "--model", "ball-small").stderr == ""
+    assert run(folder, "--model", "ball").stderr == ""
 
 
 @given(st.floats(0.3, 3.0), st.floats(0.0, 0.01), st.integers(5, 30))

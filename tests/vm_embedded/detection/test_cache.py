@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tests.manifests import MESHES, ball_manifest
+from tests.manifests import ball_manifest
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
@@ -13,18 +13,19 @@ from vm_embedded.errors import GeometryError
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.manifest import LAYOUTS
 
 from ..strategies import SIZE, lenses, orientations, random_direction, reals, rotation, seeds
 
 LENS = Equisolid(focal_length=300.0, fov=2.2)
 
-in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
+MESHES = ("ring6", "octaves")
+"""One on a graph and one on a canvas."""
+
+in_all_layouts = pytest.mark.parametrize("mesh", MESHES)
 
 
 def manifest(**changes):
-    mesh = MESHES[changes.get("layout", "plain")]
-    return ball_manifest(**{"intersections": 2.0, "mesh": mesh, "max_distance": 3.0} | changes)
+    return ball_manifest(**{"intersections": 2.0, "max_distance": 3.0} | changes)
 
 
 def built(cache, height):
@@ -36,21 +37,14 @@ def built(cache, height):
 def assert_same_as_without(cache, orientation, lens, size):
     """The prepared part gives what the whole mesh gives, to the last digit, of all points that are answered."""
     view = cache.view(orientation, lens, size)
-    slots, places = view.layout.slots, view.layout.places
-    prepared = project(view.layout, view.rotation, lens, size)
-    shown = places[prepared.on_screen[places]]
+    prepared = project(view.mesh, view.rotation, lens, size)
+    shown = prepared.answered
     mesh = built(cache, cache.mesh_height(orientation.height))
     answered = mesh if mesh.margin is None else mesh.part(np.flatnonzero(~mesh.margin))
     whole = project(answered, view.rotation, lens, size).visible
-    np.testing.assert_array_equal(view.layout.rays[shown], whole.graph.rays)
+    np.testing.assert_array_equal(view.mesh.rays[shown], whole.graph.rays)
     np.testing.assert_array_equal(prepared.pixels[shown], whole.pixels)
-    rank = np.full(len(view.layout) + 1, len(shown))
-    rank[shown] = np.arange(len(shown))
-    np.testing.assert_array_equal(rank[view.layout.links(shown)], whole.graph.neighbors[:-1])
-    if mesh.margin is None:  # Copies of a point are on screen where it is, and gaps never.
-        np.testing.assert_array_equal(prepared.on_screen, np.append(prepared.on_screen[places], False)[slots])
-    assert not prepared.on_screen[np.isnan(view.layout.rays[:, 0])].any()
-    assert prepared.only(view.layout.original).on_screen.sum() == len(whole)
+    np.testing.assert_array_equal(view.mesh.part(shown).neighbors, whole.graph.neighbors)
     np.testing.assert_allclose(view.heading @ view.rotation, orientation.rotation, atol=1e-12)
 
 
@@ -79,8 +73,8 @@ AHEAD = (Settings(), 0.8, 0.0, 0.4)
 @given(buckets(), lenses(), seeds)
 @example(AHEAD, Equisolid(focal_length=100.0, fov=2.0 * math.pi), 0)
 @example(AHEAD, Equidistant(focal_length=60.0, fov=2.0 * math.pi), 0)
-def test_a_bucket_never_changes_an_answer(layout, bucket, lens, seed):
-    cache = MeshCache(manifest(layout=layout), bucket[0])
+def test_a_bucket_never_changes_an_answer(mesh, bucket, lens, seed):
+    cache = MeshCache(manifest(mesh=mesh), bucket[0])
     random = np.random.default_rng(seed)
     for _ in range(6):
         assert_same_as_without(cache, within(bucket, random), lens, SIZE)
@@ -93,9 +87,9 @@ BROAD = (Settings(roll_step=0.5, pitch_step=0.5), 1.0, 0.0, 0.0)
 @in_all_layouts
 @given(buckets(), lenses(), seeds)
 @example(BROAD, Equisolid(focal_length=127.0, fov=1.0, distortion=(-1e-6, 0.0)), 0)
-def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, bucket, lens, seed):
+def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(mesh, bucket, lens, seed):
     """Matrices from files are rotations to some digits only; those that Orientation accepts are answered alike."""
-    cache = MeshCache(manifest(layout=layout), bucket[0])
+    cache = MeshCache(manifest(mesh=mesh), bucket[0])
     random = np.random.default_rng(seed)
     for _ in range(6):
         exact = within(bucket, random)
@@ -106,8 +100,8 @@ def test_a_bucket_never_changes_an_answer_of_rotations_with_few_digits(layout, b
 @in_all_layouts
 @pytest.mark.parametrize("stretch", [1.0 - 4.9e-4, 1.0 + 4.9e-4])
 @pytest.mark.parametrize("fov", [0.2, 0.8, 1.6])
-def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch, layout):
-    fine = manifest(intersections=20.0, max_distance=1.5, layout=layout)
+def test_a_bucket_never_changes_an_answer_of_rotations_that_are_a_little_too_long_or_short(fov, stretch, mesh):
+    fine = manifest(intersections=20.0, max_distance=1.5, mesh=mesh)
     cache = MeshCache(fine, Settings(pitch_step=1e-3, roll_step=1e-3))
     for pitch in (0.8, 1.0, 1.2):
         stretched = Orientation(0.8, stretch * Orientation.from_roll_pitch(0.8, pitch=pitch).rotation)
@@ -147,8 +141,8 @@ def test_heights_share_few_meshes(tolerance, seed):
 
 @in_all_layouts
 @given(orientations(0.3, 1.5))
-def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layout, orientation):
-    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=0.0))
+def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(mesh, orientation):
+    cache = MeshCache(manifest(mesh=mesh), Settings(height_tolerance=0.0))
     view = cache.view(orientation, LENS, SIZE)
     assert cache.mesh_height(orientation.height) == orientation.height
     np.testing.assert_array_equal(view.rotation, orientation.rotation)
@@ -158,12 +152,11 @@ def test_without_tolerance_a_frame_has_its_own_height_rotation_and_heading(layou
 
 @in_all_layouts
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
-def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, layout):
-    cache = MeshCache(manifest(layout=layout), Settings(height_tolerance=tolerance))
+def test_a_camera_that_looks_at_the_sky_has_no_points(tolerance, mesh):
+    cache = MeshCache(manifest(mesh=mesh), Settings(height_tolerance=tolerance))
     lens = Rectilinear(focal_length=600.0, fov=1.2)
     view = cache.view(Orientation.from_roll_pitch(0.8, pitch=-1.2), lens, SIZE)
-    assert len(view.layout.places) == 0
-    assert not project(view.layout, view.rotation, lens, SIZE).on_screen.any()
+    assert len(view.mesh) == 0
 
 
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
@@ -191,21 +184,21 @@ def test_hits_and_misses_are_counted():
 
 
 @in_all_layouts
-def test_a_hit_gives_the_same_layout(layout):
-    cache = MeshCache(manifest(layout=layout), Settings())
+def test_a_hit_gives_the_same_layout(mesh):
+    cache = MeshCache(manifest(mesh=mesh), Settings())
     ahead = Orientation.from_roll_pitch(0.8, pitch=0.4)
     assert cache.view(ahead, LENS, SIZE).layout is cache.view(ahead, LENS, SIZE).layout
 
 
 @in_all_layouts
-def test_nbytes_is_what_is_held(layout):
-    cache = MeshCache(manifest(layout=layout), Settings())
+def test_nbytes_is_what_is_held(mesh):
+    cache = MeshCache(manifest(mesh=mesh), Settings())
     first = cache.view(Orientation.from_roll_pitch(0.8, pitch=0.4), LENS, SIZE)
     whole = built(cache, cache.mesh_height(0.8))
-    one = first.layout.nbytes + first.levels.nbytes
+    one = sum(each.nbytes for each in (first.mesh, first.layout, first.levels))
     assert cache.nbytes == whole.nbytes + one
     second = cache.view(Orientation.from_roll_pitch(0.8, pitch=1.2), LENS, SIZE)
-    assert cache.nbytes == whole.nbytes + one + second.layout.nbytes + second.levels.nbytes
+    assert cache.nbytes == whole.nbytes + one + sum(each.nbytes for each in (second.mesh, second.layout, second.levels))
 
 
 def test_the_least_recently_used_mesh_goes_first():
@@ -226,18 +219,15 @@ def test_the_least_recently_used_mesh_goes_first():
 
 @in_all_layouts
 @given(st.lists(st.integers(0, 5), min_size=1, max_size=20), reals(0.0, 0.6))
-def test_the_memory_limit_is_obeyed_and_changes_no_answer(layout, order, cache_mib):
-    cache = MeshCache(manifest(layout=layout), Settings(cache_mib=cache_mib))
-    free = MeshCache(manifest(layout=layout), Settings())
+def test_the_memory_limit_is_obeyed_and_changes_no_answer(mesh, order, cache_mib):
+    cache = MeshCache(manifest(mesh=mesh), Settings(cache_mib=cache_mib))
+    free = MeshCache(manifest(mesh=mesh), Settings())
     for index in order:
         orientation = Orientation.from_roll_pitch(0.5 + 0.1 * (index % 3), pitch=0.3 + 0.2 * index)
         limited, unlimited = (each.view(orientation, LENS, SIZE) for each in (cache, free))
         assert cache.nbytes <= cache_mib * 2**20
-        np.testing.assert_array_equal(limited.layout.rays, unlimited.layout.rays)
-        places = limited.layout.places
-        np.testing.assert_array_equal(limited.layout.links(places), unlimited.layout.links(places))
-        np.testing.assert_array_equal(limited.layout.slots, unlimited.layout.slots)
-        np.testing.assert_array_equal(limited.layout.places, unlimited.layout.places)
+        np.testing.assert_array_equal(limited.mesh.rays, unlimited.mesh.rays)
+        np.testing.assert_array_equal(limited.mesh.neighbors, unlimited.mesh.neighbors)
     assert cache.hits + cache.misses == len(order)
 
 
@@ -245,7 +235,7 @@ def test_without_memory_nothing_is_held():
     cache = MeshCache(manifest(), Settings(cache_mib=0.0))
     orientation = Orientation.from_roll_pitch(0.8, pitch=0.4)
     for _ in range(3):
-        assert len(cache.view(orientation, LENS, SIZE).layout.places) > 0
+        assert len(cache.view(orientation, LENS, SIZE).mesh) > 0
     assert (cache.hits, cache.misses, cache.nbytes) == (0, 3, 0)
 
 
@@ -253,8 +243,8 @@ def test_without_memory_nothing_is_held():
 def test_a_camera_that_wanders_is_answered_right(seed):
     """Through many buckets with one cache, straight down and upside down included."""
     random = np.random.default_rng(seed)
-    layout = LAYOUTS[seed % len(LAYOUTS)]
-    cache = MeshCache(manifest(max_distance=2.0, layout=layout), Settings(cache_mib=2.0))
+    mesh = MESHES[seed % len(MESHES)]
+    cache = MeshCache(manifest(max_distance=2.0, mesh=mesh), Settings(cache_mib=2.0))
     matrix = Orientation.from_roll_pitch(1.0, pitch=1.5).rotation
     for _ in range(5):
         matrix = matrix @ rotation(0.4 * random_direction(random))

@@ -10,39 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from onnx import helper
 
-from tests.drawn_scenes import CHECKPOINT, FOLDER, IMAGES, MODEL
+from tests.drawn_scenes import FOLDER, IMAGES, MODEL
 from vm_embedded import Detector, GeometryError, InputError, ModelError, Orientation, Settings, read_lens_file
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.footprint import levels_for
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.mesh.mesh import Mesh
-from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.plain_layout import PlainLayout
-from vm_embedded.network.runs_layout import RunsLayout
-from vm_export.checkpoint import Checkpoint
-from vm_export.export import export
-
-RING_LAYOUTS = ("plain", "runs")
-"""Layouts of a network for rings."""
-
-in_both_layouts = pytest.mark.parametrize("layout", RING_LAYOUTS)
 
 
 @pytest.fixture(scope="module")
 def detector():
     return Detector.from_file(MODEL)
-
-
-@pytest.fixture(scope="module")
-def models(tmp_path_factory):
-    """The drawn frames' network in every layout."""
-    folder = tmp_path_factory.mktemp("models")
-    for layout in RING_LAYOUTS:
-        export(Checkpoint.load(CHECKPOINT), folder / f"{layout}.onnx", layout)
-    return {layout: folder / f"{layout}.onnx" for layout in RING_LAYOUTS}
 
 
 def frame(index=0):
@@ -58,15 +40,15 @@ def without_bucket(detector, image, orientation, lens):
     def whole(orientation, lens, size):
         view = prepared(orientation, lens, size)
         height = fresh.cache.mesh_height(orientation.height)
-        layout = choose_layout(fresh.cache._build(height), fresh.manifest)
-        return view._replace(layout=layout, levels=levels_for(fresh.manifest, layout, height, lens))
+        mesh = fresh.cache._build(height)
+        levels = levels_for(fresh.manifest, mesh, height, lens)
+        return view._replace(mesh=mesh, layout=choose_layout(mesh, fresh.manifest), levels=levels)
 
     fresh.cache.view = whole
     return fresh.detect(image, orientation, lens)
 
 
 @pytest.mark.long
-@in_both_layouts
 @given(
     index=st.integers(0, 5),
     pitch=st.floats(-0.5, 0.5),
@@ -74,9 +56,9 @@ def without_bucket(detector, image, orientation, lens):
     steps=st.floats(0.01, 0.3),
 )
 @settings(max_examples=25)
-def test_a_bucket_never_changes_an_answer(models, layout, index, pitch, roll, steps):
+def test_a_bucket_never_changes_an_answer(index, pitch, roll, steps):
     image, orientation, lens = frame(index)
-    detector = Detector(read_model(models[layout]), Settings(pitch_step=steps, roll_step=steps))
+    detector = Detector(read_model(MODEL), Settings(pitch_step=steps, roll_step=steps))
     # Anywhere in its bucket, from the frame's own orientation on.
     turned = Orientation.from_roll_pitch(
         orientation.height, orientation.roll + roll * steps, orientation.pitch + pitch * steps, orientation.yaw
@@ -92,25 +74,10 @@ def test_a_bucket_never_changes_an_answer(models, layout, index, pitch, roll, st
     assert detector.cache.hits == 1
 
 
-@pytest.mark.parametrize("index", range(len(IMAGES)))
-def test_both_layouts_find_the_same(models, index):
-    one, other = (Detector.from_file(path).detect(*frame(index), explain=True) for path in models.values())
-    np.testing.assert_array_equal(one.rays, other.rays)
-    np.testing.assert_array_equal(one.pixels, other.pixels)
-    np.testing.assert_allclose(one.probabilities, other.probabilities, atol=1e-4)
-    assert len(one) == len(other) >= 1
-    for ours, theirs in zip(one, other, strict=True):
-        assert ours.class_name == theirs.class_name
-        assert ours.confidence == pytest.approx(theirs.confidence, abs=1e-4)
-        np.testing.assert_allclose(ours.position, theirs.position, atol=1e-6)
-    assert [each.reason for each in one.rejected] == [each.reason for each in other.rejected]
-
-
-@in_both_layouts
 @pytest.mark.parametrize("tolerance", [0.0, 0.5])
-def test_a_camera_that_looks_at_the_sky_sees_nothing_and_says_so(models, layout, tolerance):
+def test_a_camera_that_looks_at_the_sky_sees_nothing_and_says_so(tolerance):
     image, orientation, lens = frame()
-    detector = Detector.from_file(models[layout], Settings(height_tolerance=tolerance))
+    detector = Detector.from_file(MODEL, Settings(height_tolerance=tolerance))
     found = detector.detect(image, Orientation.from_roll_pitch(orientation.height, pitch=-1.5), lens, explain=True)
     assert (len(found), len(found.rejected)) == (0, 0)
     assert found.rays.shape == (0, 3)
@@ -208,38 +175,27 @@ def claim(**entries):
     return change
 
 
-@in_both_layouts
-def test_a_network_that_answers_its_self_test_wrongly_is_refused(models, layout, tmp_path):
+def test_a_network_that_answers_its_self_test_wrongly_is_refused(tmp_path):
     def break_weights(model):
         weights = next(each for each in model.graph.initializer if each.name == "layer0.kernel")
         weights.CopyFrom(onnx.numpy_helper.from_array(-onnx.numpy_helper.to_array(weights), weights.name))
 
     with pytest.raises(ModelError, match="self-test failed"):
-        Detector.from_file(changed(tmp_path / "model.onnx", break_weights, models[layout]))
+        Detector.from_file(changed(tmp_path / "model.onnx", break_weights, MODEL))
 
 
-@in_both_layouts
 @pytest.mark.parametrize("width", [0, 4, 8])
-def test_a_self_test_of_another_mesh_is_refused(models, layout, width, tmp_path):
-    test = read_model(models[layout]).manifest.self_test.as_dict()
+def test_a_self_test_of_another_mesh_is_refused(width, tmp_path):
+    test = read_model(MODEL).manifest.self_test.as_dict()
     other = [(row + row)[:width] for row in test["neighbors"]]
     with pytest.raises(ModelError):
-        Detector.from_file(
-            changed(tmp_path / "model.onnx", claim(self_test=test | {"neighbors": other}), models[layout])
-        )
+        Detector.from_file(changed(tmp_path / "model.onnx", claim(self_test=test | {"neighbors": other}), MODEL))
 
 
-@in_both_layouts
-def test_a_network_with_other_inputs_than_its_manifest_is_refused(models, layout, tmp_path):
-    (other,) = set(RING_LAYOUTS) - {layout}
-    for entries in ({"mesh": "ring8"}, {"layout": other}):
+def test_a_network_with_other_inputs_than_its_manifest_is_refused(tmp_path):
+    for mesh in ("ring8", "octaves"):
         with pytest.raises(ModelError, match="inputs and outputs"):
-            Detector.from_file(changed(tmp_path / "model.onnx", claim(**entries), models[layout]))
-
-
-def test_a_network_in_runs_that_wants_missing_neighbors_to_be_the_point_itself_is_refused(models, tmp_path):
-    with pytest.raises(ModelError, match="layout runs needs edge hard"):
-        Detector.from_file(changed(tmp_path / "model.onnx", claim(edge="same"), models["runs"]))
+            Detector.from_file(changed(tmp_path / "model.onnx", claim(mesh=mesh), MODEL))
 
 
 def test_a_network_with_an_unknown_operator_is_refused(tmp_path):
@@ -258,14 +214,6 @@ class Broken(PlainLayout):
         return feeds | {"neighbors": np.full_like(feeds["neighbors"], 99)}
 
 
-class BrokenRuns(RunsLayout):
-    """The same for runs."""
-
-    def feeds(self, colors, on_screen):
-        feeds = super().feeds(colors, on_screen)
-        return feeds | {"columns": np.full_like(feeds["columns"], 9999)}
-
-
 def small_mesh():
     """Four points in a ring, each with two neighbors and four missing ones."""
     neighbors = np.full((5, 6), 4, dtype=np.int32)
@@ -273,27 +221,24 @@ def small_mesh():
     return Mesh(np.zeros((4, 3)), neighbors)
 
 
-@in_both_layouts
-def test_neighbors_out_of_range_are_an_error_and_not_a_crash(models, layout):
-    session = Detector.from_file(models[layout]).session
-    broken = (
-        Broken(small_mesh(), "hard") if layout == "plain" else BrokenRuns(small_mesh(), MESH_MODELS["ring6"].groups)
-    )
-    colors = np.zeros((3, len(broken)), dtype=np.float32)
+def test_neighbors_out_of_range_are_an_error_and_not_a_crash():
+    session = Detector.from_file(MODEL).session
+    broken = Broken(small_mesh(), "hard")
+    colors = np.zeros((3, 4), dtype=np.float32)
     with pytest.raises(ModelError, match="can't run"):
-        session.run(broken, colors, broken.slots < 4)
+        session.run(broken, colors, np.ones(4, dtype=bool), np.arange(4))
 
 
-def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(models, tmp_path):
-    hard = Detector.from_file(models["plain"]).session
-    same = Detector.from_file(changed(tmp_path / "model.onnx", claim(edge="same"), models["plain"])).session
+def test_the_edge_policy_same_links_missing_neighbors_to_the_point_itself(tmp_path):
+    hard = Detector.from_file(MODEL).session
+    same = Detector.from_file(changed(tmp_path / "model.onnx", claim(edge="same"), MODEL)).session
     mesh = small_mesh()
     alone = Mesh(mesh.rays, np.where(mesh.neighbors == 4, np.arange(5, dtype=np.int32)[:, None], mesh.neighbors))
     colors = np.random.default_rng(0).random((4, 3)).astype(np.float32)
 
     def answers(session, mesh, shown=(True, True, True, True)):
         layout = choose_layout(mesh, session.model.manifest)
-        return session.run(layout, colors.T, np.array(shown))
+        return session.run(layout, colors.T, np.array(shown), np.arange(4))
 
     np.testing.assert_array_equal(answers(same, mesh), answers(hard, alone))
     assert np.abs(answers(same, mesh) - answers(hard, mesh)).max() > 1e-3

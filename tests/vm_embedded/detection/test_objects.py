@@ -12,7 +12,7 @@ from tests.manifests import ball_manifest
 from vm_embedded.detection.objects import locate
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.prepared_view import PreparedView
-from vm_embedded.detection.projection import Projection, project, to_camera
+from vm_embedded.detection.projection import project, to_camera
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -21,7 +21,6 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.plain_layout import PlainLayout
 
 SIZE = (1280, 1024)
 PICTURE = Pyramid(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8), "bgr")
@@ -35,20 +34,11 @@ def scene_at(height=0.9, pitch=0.6, shape=None, mesh_shape=None, lens=None):
     mesh_shape = mesh_shape or shape
     lens = lens or Equisolid(focal_length=500.0, fov=2.6)
     orientation = Orientation.from_roll_pitch(height, 0.05, pitch)
-    layout = PlainLayout(build_mesh(mesh_shape, height, K, 8.0), "hard")
+    mesh = build_mesh(mesh_shape, height, K, 8.0)
     rings = K * float(shape.spacing(height) / mesh_shape.spacing(height))
-    view = PreparedView(layout, None, shape, rings, height, orientation.level, np.eye(3), lens, SIZE)
-    projected = project(layout, orientation.level, lens, SIZE)
-    return Observation(PICTURE, view, BALLS, projected, np.zeros((len(layout), 1), dtype=np.float32))
-
-
-def reordered(scene, order):
-    """The same observation of the points `order`, in that order; those at the same place sum in the same order."""
-    mesh = build_mesh(scene.view.shape, scene.view.height, K, 8.0)
-    layout = PlainLayout(mesh.part(order), "hard")
-    layout.slots = order.astype(np.int32)
-    projected = Projection(layout, scene.projected.pixels[order], scene.projected.on_screen[order])
-    return replace(scene, view=scene.view._replace(layout=layout), projected=projected)
+    view = PreparedView(mesh, None, None, shape, rings, height, orientation.level, np.eye(3), lens, SIZE)
+    projected = project(mesh, orientation.level, lens, SIZE)
+    return Observation(PICTURE, view, BALLS, projected, np.zeros((len(projected.answered), 1), dtype=np.float32))
 
 
 def ideal(scene, *spots, radius=None):
@@ -72,9 +62,12 @@ def lowest_of(scene):
     return int(np.argmax(np.where(scene.projected.on_screen, scene.projected.pixels[:, 1], -np.inf)))
 
 
+def answered(scene, probability):
+    return replace(scene, answers=probability[scene.projected.answered, None])
+
+
 def objects_in(scene, probability, **settings):
-    answered = replace(scene, slot_answers=probability[:, None])
-    return locate(answered, None, Settings(**settings), Stopwatch(), explain=True)
+    return locate(answered(scene, probability), {}, Settings(**settings), Stopwatch(), explain=True)
 
 
 @given(distance=st.floats(0.6, 6.0), heading=st.floats(-0.4, 0.4), height=st.floats(0.5, 1.3))
@@ -182,8 +175,7 @@ def test_noise_never_breaks_the_search(seed, share):
 
 def test_reasons_are_only_collected_when_asked_for():
     scene = scene_at()
-    observation = replace(scene, slot_answers=ideal(scene, (1.3, 0.0), radius=0.3)[:, None])
-    _, rejected = locate(observation, None, Settings(), Stopwatch())
+    _, rejected = locate(answered(scene, ideal(scene, (1.3, 0.0), radius=0.3)), {}, Settings(), Stopwatch())
     assert rejected == ()
 
 
@@ -195,22 +187,6 @@ def test_a_larger_object_radius_is_an_object_of_more_rings():
     assert found[0].position[2] == pytest.approx(0.12)
 
 
-@pytest.mark.long
-@given(st.integers(0, 2**32 - 1), st.floats(0.0, 0.2))
-@settings(max_examples=25)
-def test_how_the_mesh_lies_in_memory_changes_no_digit(seed, noise):
-    random = np.random.default_rng(seed)
-    scene = scene_at(random.uniform(0.6, 1.2), pitch=random.uniform(0.3, 1.5))
-    spots = [(random.uniform(0.3, 2.5), random.uniform(-0.8, 0.8)) for _ in range(3)]
-    probability = ideal(scene, *spots)
-    probability = np.where(random.random(len(probability)) < noise, random.random(len(probability)), probability)
-    order = random.permutation(len(probability))
-    plain = objects_in(scene, probability)
-    other = objects_in(reordered(scene, order), probability[order])
-    for before, after in zip(plain, other, strict=True):
-        assert [each.as_dict() for each in before] == [each.as_dict() for each in after]
-
-
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=15)
 def test_what_is_off_screen_changes_nothing(seed):
@@ -219,8 +195,9 @@ def test_what_is_off_screen_changes_nothing(seed):
     scene = scene_at(0.9, pitch=random.uniform(0.3, 1.2))
     spot = scene.view.shape.center_along(scene.projected.graph.rays[[lowest_of(scene)]], scene.view.height)[0, :2]
     probability = ideal(scene, spot, (1.2, 0.3))
-    shown = np.flatnonzero(scene.projected.on_screen)
-    with_it, without_it = objects_in(scene, probability), objects_in(reordered(scene, shown), probability[shown])
+    visible = scene.projected.visible
+    alone = replace(scene, view=scene.view._replace(mesh=visible.graph), projected=visible)
+    with_it, without_it = objects_in(scene, probability), objects_in(alone, probability[scene.projected.answered])
     assert len(with_it[0]) == 2
     for one, other in zip(with_it, without_it, strict=True):
         assert [each.as_dict() for each in one] == [each.as_dict() for each in other]

@@ -43,6 +43,19 @@ def test_the_order_of_asking_changes_nothing(seed, order):
         np.testing.assert_array_equal(one.level(number), other.level(number))
 
 
+@given(st.integers(0, 99), st.integers(0, 4), st.floats(-9.0, 70.0), st.floats(-9.0, 70.0), st.floats(0.0, 30.0))
+def test_a_part_of_the_frame_gives_the_colors_of_the_whole(seed, number, left, top, width):
+    image = frame(seed, 91, 67)
+    whole, made = Pyramid(image, "bgr"), Pyramid(image, "bgr")
+    whole.level(1)
+    x, y = np.meshgrid(np.linspace(left, left + width, 5), np.linspace(top, top + 8.0, 4))
+    x, y = x.astype(np.float32), y.astype(np.float32)
+    expected = whole.at(number, x, y)
+    np.testing.assert_array_equal(made.at(number, x, y), expected)
+    seen = y < top + 4.0
+    np.testing.assert_array_equal(made.at(number, x, y, seen)[seen], expected[seen])
+
+
 @pytest.mark.parametrize(("width", "height"), [(2, 2), (3, 40), (40, 3), (5, 7)])
 def test_a_tiny_frame_becomes_one_pixel_wide_at_least(width, height):
     made = Pyramid(frame(1, width, height), "bgr")

@@ -13,7 +13,7 @@ from vm_embedded.errors import InputError
 KNOWN = {each.name: each for each in fields(Settings)}
 RANGES = {name: each.metadata["limits"] for name, each in KNOWN.items() if "limits" in each.metadata}
 CHOICES = {name: each.metadata["allowed"] for name, each in KNOWN.items() if "allowed" in each.metadata}
-WHOLE = {"threads", "max_proposals"}
+WHOLE = {"threads"}
 ANGLES = {"pitch_step", "roll_step"}
 
 

@@ -11,7 +11,6 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.plain_layout import PlainLayout
 
 SIZE = (640, 512)
 BALL = Sphere(0.1)
@@ -22,8 +21,8 @@ LENS = Equisolid(focal_length=400.0, fov=2.2)
 def view_at(height=0.9, pitch=0.5, lens=LENS, roll=0.05):
     """What a camera at this height [m] sees of a mesh for BALL."""
     orientation = Orientation.from_roll_pitch(height, roll, pitch)
-    layout = PlainLayout(build_mesh(BALL, height, K, 8.0), "hard")
-    return PreparedView(layout, None, BALL, K, height, orientation.level, np.eye(3), lens, SIZE)
+    mesh = build_mesh(BALL, height, K, 8.0)
+    return PreparedView(mesh, None, None, BALL, K, height, orientation.level, np.eye(3), lens, SIZE)
 
 
 def center_at(view, pixel):
@@ -51,10 +50,11 @@ def picture_of(view, *centers):
 
 def observation_of(view, *centers, image=None, background=0.0):
     """An observation by a perfect mesh network of a picture with balls at these centers."""
-    projected = project(view.layout, view.rotation, view.lens, view.size)
-    seen = np.zeros(len(view.layout), dtype=np.float32)
+    projected = project(view.mesh, view.rotation, view.lens, view.size)
+    rays = view.mesh.rays[projected.answered]
+    seen = np.zeros(len(rays), dtype=np.float32)
     for center in centers:
-        seen[BALL.offset(view.layout.rays, center[None], view.height)[0] < 1.0] = 0.97
+        seen[BALL.offset(rays, center[None], view.height)[0] < 1.0] = 0.97
     pyramid = Pyramid(picture_of(view, *centers) if image is None else image, "bgr")
     probabilities = np.maximum(seen, np.float32(background))[:, None]
     return Observation(pyramid, view, ball_manifest(), projected, probabilities)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vm_embedded.field.ground_points import GroundPoints
+from vm_embedded.field.ground_points import GroundPoints, ground_map
 
 HEIGHT, ACROSS = 0.9, 0.06
 
@@ -29,14 +29,22 @@ def ground(places, labels, height=HEIGHT, across=ACROSS, sure=0.95):
 
     The rest of each probability is outside.
     """
-    order = np.argsort(np.hypot(*places.T), kind="stable")
-    places, labels = places[order], labels[order]
-    classes = {
-        name: np.where(labels == name, sure, 0.0).astype(np.float32) for name in ("goal", "robot", "line", "field")
-    }
-    outside = (1.0 - sum(classes.values())).astype(np.float32)
-    middle = places.sum(axis=0) if len(places) else np.array([1.0, 0.0])
-    return GroundPoints(places, height, across, classes, outside, middle / np.hypot(*middle))
+    ahead = places.sum(axis=0) if len(places) else np.array([1.0, 0.0])
+    heading = np.column_stack([ahead, [-ahead[1], ahead[0]]]) / np.hypot(*ahead)
+    rays = np.column_stack([places @ heading, np.full(len(places), -height)])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    inside = np.where(
+        np.isin(labels, ["line", "field"]), 2.0 * sure - 1.0, np.where(labels == "outside", -1.0, sure - 1.0)
+    )
+    return GroundPoints(
+        ground_map(rays, np.arange(len(rays))),
+        np.ones(len(rays), dtype=bool),
+        np.where(labels == "line", sure, 0.0).astype(np.float32),
+        inside.astype(np.float32),
+        height,
+        across,
+        heading,
+    )
 
 
 def inside_of(places, corners):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.field.border import _hull, _hulls, find_border
+from vm_embedded.field.border import _beyond, _hull, _hulls, find_border
 
 from .ground import behind, ground, inside_of, mesh, turned
 
@@ -92,9 +92,10 @@ def test_it_is_convex(noise):
 def test_each_hull_is_that_of_all_places_but_some_corners_of_those_before(seed, count):
     random = np.random.default_rng(seed)
     azimuths = np.sort(random.uniform(-1.2, 1.2, count))
-    places = random.uniform(2.0, 6.0, count)[:, None] * np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+    places = (random.uniform(2.0, 6.0, count) * np.exp(1j * azimuths)).tolist()
     left, before = set(range(count)), None
-    for corners in _hulls(places):
+    for corners, beyond in _hulls(places):
         left -= set(before or ()) - set(corners)
-        assert corners == _hull(list(map(complex, *places.T)), sorted(left))
+        assert corners == _hull(places, sorted(left))
+        assert beyond == _beyond(places, corners)
         before = corners

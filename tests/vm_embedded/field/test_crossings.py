@@ -1,19 +1,31 @@
 """Crossings have their kind, place and heading; goals are pairs of posts."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.field.crossings import find_crossings
-from vm_embedded.field.features import Segment, Upright
+from vm_embedded.field.crossings import certain_crossings, possible_crossings
+from vm_embedded.field.features import Upright
 from vm_embedded.field.goals import pair_posts
+from vm_embedded.field.lines import Piece
 
 from .ground import turned
 
 
 def line(start, end, angle=0.0, confidence=0.9):
-    return Segment(np.array([start, end], dtype=float) @ turned(angle), np.zeros((2, 2)), confidence)
+    """A piece and its confidence."""
+    return Piece(
+        np.array([start, end], dtype=float) @ turned(angle), math.dist(start, end), np.arange(9), 3.0
+    ), confidence
+
+
+def find_crossings(lines, shown):
+    possible = possible_crossings(*zip(*lines, strict=True))
+    complete = [all(shown(np.array([[each.real, each.imag] for each in behind]))) for _, *behind in possible]
+    return certain_crossings([each for each, *_ in possible], complete)
 
 
 def everywhere(places):

@@ -128,7 +128,7 @@ def test_a_few_points_are_no_circle():
 
 def test_the_same_points_have_the_same_circle():
     points = drawn([((0.5, 0.0), (5.0, 0.0))], circle=(np.array([2.0, 0.0]), 0.75))
-    off_the_line = np.flatnonzero(np.abs(points.positions[:, 1]) > 0.1)
+    off_the_line = np.flatnonzero(np.abs(points.positions[1]) > 0.1)
     one, other = (find_circle(points, off_the_line) for _ in range(2))
     assert (one.center == other.center).all()
     assert one.radius == other.radius

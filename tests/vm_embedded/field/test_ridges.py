@@ -1,5 +1,7 @@
 """Pieces of lines move to the bright ridges of the picture, and need one, or many points that speak for them."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,7 +16,7 @@ FIELD = ground(mesh(), np.full(len(mesh()), "field"))
 
 
 def piece(start, end, support=3.0):
-    return Piece(np.array([start, end], float), np.arange(5), support)
+    return Piece(np.array([start, end], float), math.dist(start, end), np.arange(5), support)
 
 
 def picture(*lines, width=0.06, line=200.0, field=90.0, pixel=0.004):

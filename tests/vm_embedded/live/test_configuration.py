@@ -42,7 +42,6 @@ object_radius = 0.11
 max_distance = 7.5
 threshold = 0.6
 min_confidence = 0.8
-max_proposals = 30
 min_inside = 0.7
 max_around = 0.3
 max_widths = 3
@@ -82,7 +81,6 @@ def test_a_full_configuration_is_read(write):
         "max_distance": 7.5,
         "threshold": 0.6,
         "min_confidence": 0.8,
-        "max_proposals": 30,
         "min_inside": 0.7,
         "max_around": 0.3,
         "max_widths": 3,

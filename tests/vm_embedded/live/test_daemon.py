@@ -103,7 +103,7 @@ def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad
         before = len(found.frames)
         found.wait(lambda: len(found.frames) > before + 5)
         assert not any("track" in each for frame in found.frames for each in frame["detections"])
-        path.write_text('model = "ball-small"\n[camera]\nsource = "synthetic"\n[track]\non = true\n')
+        path.write_text('model = "ball"\n[camera]\nsource = "synthetic"\n[track]\non = true\n')
         found.process.send_signal(signal.SIGHUP)
         found.wait(lambda: [each for each in found.events if each["event"] == "reloaded"])
         before = len(found.frames)
@@ -115,7 +115,7 @@ def test_hangup_reads_the_configuration_again_and_keeps_the_old_one_if_it_is_bad
 @pytest.mark.long
 def test_hangup_refuses_files_that_may_never_end(tmp_path):
     path, model, pipe = (tmp_path / each for each in ("vm.toml", "model.onnx", "pipe"))
-    model.symlink_to(model_path("ball-small"))
+    model.symlink_to(model_path("ball"))
     path.write_text(f'model = "{model}"\n[camera]\nsource = "synthetic"\n')
     os.mkfifo(pipe)
     with running(tmp_path, "--config", path) as found:

@@ -69,7 +69,7 @@ def test_ten_thousand_damaged_configurations_are_read_or_refused_in_a_line(tmp_p
 def test_ten_thousand_damaged_models_are_loaded_or_refused_in_a_line(tmp_path):
     chance = random.Random(2)
     path = tmp_path / "damaged.onnx"
-    change_looks(model_path("ball-small"), path, [look_checkpoint()])  # a small look, so that damage hits all parts
+    change_looks(model_path("ball"), path, [look_checkpoint()])  # a small look, so that damage hits all parts
     whole = path.read_bytes()
     outcomes = []
     started = time.monotonic()

@@ -72,7 +72,7 @@ def test_what_can_not_be_read_or_written_is_said_without_a_traceback(tmp_path):
 
 def test_the_printed_configuration_can_be_put_into_any_folder(tmp_path):
     """Model and lens are then named by absolute paths; the lens keeps its distortion and pose."""
-    shutil.copy(model_path("ball-small"), tmp_path / "own.onnx")
+    shutil.copy(model_path("ball"), tmp_path / "own.onnx")
     lens = "camera_matrix: [500, 0, 320, 0, 500, 240, 0, 0, 1]\ndistortion_coefficients: [0.1, 0, 0, 0]\n"
     (tmp_path / "lens.yaml").write_text(f"{lens}Hoc: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.7], [0, 0, 0, 1]]\n")
     (tmp_path / "vm.toml").write_text('model = "own.onnx"\nlens = "lens.yaml"\n')

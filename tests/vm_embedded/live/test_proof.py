@@ -9,16 +9,16 @@ from tests.fixtures.make_drawn import FOLDER
 from vm_embedded.errors import ModelError
 from vm_embedded.live.proof import prove
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.look_test import LookTest
+from vm_embedded.network.example import SelfTest
+from vm_embedded.network.look_example import LookTest
 from vm_embedded.network.model_file import read_model
-from vm_embedded.network.self_test import SelfTest
 
 pytest.importorskip("onnxruntime")
 
 
 @pytest.fixture(scope="module")
 def ball():
-    return read_model(model_path("ball-small"))
+    return read_model(model_path("ball"))
 
 
 def test_the_proof_says_what_was_found(ball):
@@ -30,30 +30,27 @@ def test_without_a_canary_the_self_tests_are_the_proof(ball):
 
 
 @pytest.mark.parametrize("empty", [False, True], ids=["none", "empty"])
-@pytest.mark.parametrize("part", ["mesh network", "close look at ball", "glance at ball"])
+@pytest.mark.parametrize("part", ["mesh network", "close look at ball"])
 def test_a_model_without_a_self_test_is_refused(ball, part, empty):
     manifest = ball.manifest
-    look, glance = manifest.look, manifest.look.glance
+    (look,) = manifest.looks
     test = manifest.self_test
     no_points = SelfTest(test.points[-1:], np.zeros_like(test.neighbors[-1:]), test.probabilities[-1:])
-    no_patches = [LookTest(each.self_test.patches[:0], each.self_test.answers[:0]) for each in (look, glance)]
+    no_patches = LookTest(look.self_test.patches[:0], look.self_test.answers[:0])
     without = {
         "mesh network": replace(manifest, self_test=no_points if empty else None),
-        "close look at ball": replace(manifest, look=replace(look, self_test=no_patches[0] if empty else None)),
-        "glance at ball": replace(
-            manifest, look=replace(look, glance=replace(glance, self_test=no_patches[1] if empty else None))
-        ),
+        "close look at ball": replace(manifest, looks=(replace(look, self_test=no_patches if empty else None),)),
     }
     with pytest.raises(ModelError, match=f"its {part} has no self-test"):
         prove(replace(ball, manifest=without[part]))
 
 
-@pytest.mark.parametrize("number", [0, 1])
+@pytest.mark.parametrize("number", [1, 2])
 def test_a_model_without_a_self_test_of_a_look_at_uprights_is_refused(number):
     soccer = read_model(model_path("soccer"))
-    looks = list(soccer.manifest.upright_looks)
+    looks = list(soccer.manifest.looks)
     looks[number] = replace(looks[number], self_test=None)
-    untested = replace(soccer, manifest=replace(soccer.manifest, upright_looks=tuple(looks)))
+    untested = replace(soccer, manifest=replace(soccer.manifest, looks=tuple(looks)))
     with pytest.raises(ModelError, match=f"its close look at {looks[number].object_class} has no self-test"):
         prove(untested)
 

@@ -22,7 +22,7 @@ from vm_embedded.network.bundled import model_path
 
 pytest.importorskip("onnxruntime")
 
-BALL = model_path("ball-small").read_bytes()
+BALL = model_path("ball").read_bytes()
 
 
 def proved(content):
@@ -135,7 +135,7 @@ def test_attack_11_the_process_that_checks_a_model_never_runs_it(tmp_path, comma
 def test_attack_3_frames_and_signals_go_on_while_a_new_model_is_proved(tmp_path):
     path, model = tmp_path / "vm.toml", tmp_path / "model.onnx"
     text = 'model = "{}"\n[camera]\nsource = "synthetic"\n'
-    path.write_text(text.format("ball-small"))
+    path.write_text(text.format("ball"))
     model.write_bytes(endless())
     with running(tmp_path, "--config", path) as found:
         found.wait_for_state("ok")

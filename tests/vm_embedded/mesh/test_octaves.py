@@ -148,7 +148,7 @@ def test_mirror_images_are_alike(case):
 
 @given(cases())
 def test_strips_are_whole_pictures_with_context_on_all_sides(case):
-    """At least four rows below, or all rings that there are, rows at equal angles above, and columns beside."""
+    """Two rows below, or all rings that there are, at least three rows at equal angles above, and columns beside."""
     *octaves, foot = strips_of(build_mesh(*case, "octaves"))
     for strip in [*octaves, foot]:
         rows, columns = (strip.cells[:, ::-1] - strip.cells[:, ::-1].min(axis=0)).max(axis=0) + 1
@@ -159,15 +159,15 @@ def test_strips_are_whole_pictures_with_context_on_all_sides(case):
         row = row - row.min()
         core = strip.cells[~strip.margin] - [0, strip.cells[:, 1].min()]
         below, above = core[:, 1].min(), row.max() - core[:, 1].max()
-        assert below in range(5)
+        assert below in range(3)
         assert core[:, 0].min() == column.max() - core[:, 0].max() == 8
         phi = inclination_of(strip)[np.searchsorted(row, np.arange(row.max() + 1))]
         angles = np.diff(phi[core[:, 1].max() :])
         np.testing.assert_allclose(angles, angles[0], atol=1e-6)
         assert phi[-1] < math.pi
-        assert above >= 8 or phi[-1] + angles[0] > math.pi - 1e-6
+        assert above >= 3 or phi[-1] + angles[0] > math.pi - 1e-6
         assert (len(phi) + GAP) % BLOCK == 0 or phi[-1] + angles[0] > math.pi - 1e-6
-    assert 4 <= foot.cells[~foot.margin][:, 0].min() <= 5
+    assert 2 <= foot.cells[~foot.margin][:, 0].min() <= 3
 
 
 @given(cases())
@@ -185,11 +185,22 @@ def test_neighbors_are_those_of_the_strip_s_lattice(case):
     steps = np.array(mesh_model("octaves").steps)
     some = np.arange(0, len(mesh), max(len(mesh) // 200, 1))
     expected = [[point_at.get(tuple(cell), len(mesh)) for cell in mesh.cells[point] + steps] for point in some.tolist()]
-    np.testing.assert_array_equal(mesh.links(some), expected)
-    beside = mesh.links(some)
+    beside = mesh.neighbors[some]
+    np.testing.assert_array_equal(beside, expected)
     present = beside < len(mesh)
     assert (mesh.strips[np.minimum(beside, len(mesh) - 1)] == mesh.strips[some][:, None])[present].all()
     assert (mesh.neighbors[-1] == len(mesh)).all()
+
+
+@given(cases(), seeds)
+def test_a_network_needs_the_kept_points_of_strips_with_some_that_are_no_margin(case, seed):
+    mesh = build_mesh(*case, "octaves")
+    kept = np.random.default_rng(seed).random(len(mesh)) < 0.01
+    strips = {strip for strip, core in zip(mesh.strips.tolist(), kept & ~mesh.margin, strict=True) if core}
+    np.testing.assert_array_equal(mesh.needed(kept), kept & np.isin(mesh.strips, list(strips)))
+    rings = build_mesh(*case, "ring6")
+    everything = np.ones(len(rings), dtype=bool)
+    assert rings.needed(everything) is everything
 
 
 @pytest.mark.parametrize(

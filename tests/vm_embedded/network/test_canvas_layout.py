@@ -6,25 +6,22 @@ from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
 from vm_embedded.detection.cache import MeshCache
-from vm_embedded.detection.footprint import BLOCK as POINTS
 from vm_embedded.detection.footprint import levels_for
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
-from vm_embedded.mesh.models import build_mesh, mesh_model
+from vm_embedded.mesh.models import build_mesh
 from vm_embedded.mesh.octaves import BLOCK, GAP
 from vm_embedded.network.canvas_layout import SMALLEST, CanvasLayout, pack
-from vm_embedded.network.choose_layout import choose_layout
 
 from ..strategies import SIZE, reals, seeds
 
 MANIFEST = ball_manifest(
-    "ball", "line", "other", mesh="octaves", layout="canvas", sampling="footprint", intersections=1.5, max_distance=4.0
+    "ball", "line", "other", mesh="octaves", sampling="footprint", intersections=1.5, max_distance=4.0
 )
 MESH = build_mesh(Sphere(0.1), 0.7, 1.5, 4.0, "octaves")
-STEPS = mesh_model("octaves").steps
 
 boxes = st.lists(st.tuples(st.integers(1, 60), st.integers(1, 300)), max_size=9)
 
@@ -75,92 +72,72 @@ def parts(draw):
     return project(MESH, turn, lens, SIZE).visible.graph
 
 
-@given(parts())
-def test_each_point_of_a_strip_with_core_points_has_one_slot_and_others_none(mesh):
-    layout = CanvasLayout(mesh, STEPS)
-    rows, columns = layout.shape
-    assert len(layout) == rows * columns
-    answered = np.unique(mesh.strips[~mesh.margin])
-    held = np.flatnonzero(np.isin(mesh.strips, answered))
-    np.testing.assert_array_equal(np.sort(layout.slots[layout.slots < len(mesh)]), held)
-    assert len(layout.pieces) == len(answered)
-    np.testing.assert_array_equal(layout.slots[layout.places], np.flatnonzero(~mesh.margin))
-    np.testing.assert_array_equal(np.flatnonzero(layout.original), np.sort(layout.places))
-    empty = layout.slots == len(mesh)
-    np.testing.assert_array_equal(layout.rays[~empty], mesh.rays[layout.slots[~empty]])
-    assert np.isnan(layout.rays[empty]).all()
-    np.testing.assert_array_equal(layout.strips[~empty], mesh.strips[layout.slots[~empty]])
-    assert (layout.strips[empty] == -1).all()
-    assert layout.rays.T.flags.c_contiguous
+@given(parts(), seeds)
+def test_values_go_to_the_places_of_their_points_and_answers_come_back(mesh, seed):
+    layout, random = CanvasLayout(mesh), np.random.default_rng(seed)
+    values = 1 + np.arange(len(mesh))
+    spread = layout.spread(values)
+    assert spread.shape == (layout.shape[0] * layout.shape[1],)
+    np.testing.assert_array_equal(np.sort(spread)[len(spread) - len(mesh) :], values)
+    assert np.count_nonzero(spread) == len(mesh)
+    assert layout.spread(np.ones(len(mesh), dtype=bool)).dtype == bool
+    some = np.flatnonzero(random.random(len(mesh)) < 0.5)
+    np.testing.assert_array_equal(layout.read(np.stack([spread, -spread])[None], some), values[some, None] * [1, -1])
 
 
 @given(parts())
 def test_a_strip_is_upright_in_its_piece(mesh):
     """A column to the right is a column to the right, a row up is a row up."""
-    layout = CanvasLayout(mesh, STEPS)
-    slots = layout.slots.reshape(layout.shape)
-    for piece, strip in zip(layout.pieces, np.unique(mesh.strips[~mesh.margin]), strict=True):
-        inside = slots[piece.region]
-        row, column = np.nonzero(inside < len(mesh))
+    layout = CanvasLayout(mesh)
+    numbers = layout.spread(1 + np.arange(len(mesh))).reshape(layout.shape) - 1
+    for piece, strip in zip(layout.pieces, np.unique(mesh.strips), strict=True):
+        inside = numbers[piece.region]
+        row, column = np.nonzero(inside >= 0)
         points = inside[row, column]
         assert (mesh.strips[points] == strip).all()
         assert len(points) == (mesh.strips == strip).sum()
+        assert piece.point == points.min()
         assert len(np.unique(mesh.cells[points] - np.stack([column, -row], axis=1), axis=0)) == 1
-
-
-@given(parts())
-def test_links_are_those_of_the_mesh_among_the_points_that_are_answered(mesh):
-    layout = CanvasLayout(mesh, STEPS)
-    core = mesh.part(np.flatnonzero(~mesh.margin))
-    found = layout.links(layout.places)
-    slot_of = np.append(layout.places, len(layout))
-    np.testing.assert_array_equal(found, slot_of[core.neighbors[:-1]])
 
 
 @given(parts(), seeds)
 def test_feeds_are_a_picture_that_is_black_where_nothing_is_shown(mesh, seed):
-    layout, random = CanvasLayout(mesh, STEPS), np.random.default_rng(seed)
-    shown = (layout.slots < len(mesh)) & (random.random(len(layout)) < 0.7)
-    colors = np.where(shown, random.random((3, len(layout)), dtype=np.float32), np.float32(np.nan))
+    layout, random = CanvasLayout(mesh), np.random.default_rng(seed)
+    on_screen = random.random(len(mesh)) < 0.7
+    shown = layout.spread(on_screen)
+    colors = np.where(shown, random.random((3, len(shown)), dtype=np.float32), np.float32(np.nan))
     before = colors.copy()
-    feeds = layout.feeds(colors, shown)
+    feeds = layout.feeds(colors, on_screen)
     np.testing.assert_array_equal(colors, before)
     assert (feeds["points"].shape, feeds["points"].dtype) == ((1, 3, *layout.shape), np.float32)
     assert (feeds["shown"].shape, feeds["shown"].dtype) == ((1, 1, *layout.shape), bool)
+    np.testing.assert_array_equal(feeds["shown"].ravel(), shown)
     np.testing.assert_array_equal(feeds["points"].reshape(3, -1)[:, shown], colors[:, shown])
     assert not feeds["points"].reshape(3, -1)[:, ~shown].any()
 
 
 def test_what_a_canvas_holds_is_read_only_and_counted():
-    layout = CanvasLayout(MESH, STEPS)
+    layout = CanvasLayout(MESH)
     arrays = [each for each in vars(layout).values() if isinstance(each, np.ndarray)]
     for array in arrays:
         assert not array.flags.writeable
     assert layout.nbytes == sum(each.nbytes for each in arrays)
 
 
-def levels_in(levels):
-    """How often the picture of each point (n,) is halved."""
-    found = np.empty(len(levels.places), dtype=int)
-    for level, blocks in levels.shares():
-        found[levels.order[blocks.start * POINTS : blocks.stop * POINTS]] = level
-    return found
-
-
-def shown_of(layout, levels, turn, lens):
+def shown_of(mesh, layout, levels, turn, lens):
     """Of each strip with answers on screen, for what is shown: cells, their places in blocks, pixels, levels, and
     whether they are answered."""
-    shown, level, found = project(layout, turn, lens, SIZE), levels_in(levels), {}
+    shown, found = project(mesh, turn, lens, SIZE), {}
+    numbers = layout.spread(1 + np.arange(len(mesh))).reshape(layout.shape) - 1
     for piece in layout.pieces:
-        box = np.arange(len(layout)).reshape(layout.shape)[piece.region]
-        seen = shown.on_screen[box]
-        if (seen & layout.original[box]).any():
-            row, column = np.nonzero(seen)
-            inside = box[row, column]
+        box = numbers[piece.region]
+        row, column = np.nonzero((box >= 0) & np.append(shown.on_screen, False)[box])
+        inside = box[row, column]
+        if shown.core[inside].any():
             cells = np.stack([column - column.min(), row - row.min()], axis=1)
             within = np.stack([column, row], axis=1) % BLOCK
-            answered = layout.original[inside]
-            found[int(layout.strips[inside[0]])] = (cells, within, shown.pixels[inside], level[inside], answered)
+            level, strip = levels.halvings[inside], int(mesh.strips[inside[0]])
+            found[strip] = (cells, within, shown.pixels[inside], level, ~mesh.margin[inside])
     return found
 
 
@@ -176,9 +153,10 @@ def test_a_bucket_shows_each_strip_as_the_whole_mesh_does(roll, pitch, tilt, ste
     turned = Orientation.from_roll_pitch(0.7, middle[1] + 0.99 * roll * step, middle[0] + 0.99 * pitch * step)
     cache = MeshCache(MANIFEST, Settings(roll_step=step, pitch_step=step))
     view, height = cache.view(turned, lens, SIZE), cache.mesh_height(0.7)
-    whole = choose_layout(cache._build(height), MANIFEST)
-    ours = shown_of(view.layout, view.levels, view.rotation, lens)
-    theirs = shown_of(whole, levels_for(MANIFEST, whole, height, lens), view.rotation, lens)
+    whole = cache._build(height)
+    levels = levels_for(MANIFEST, whole, height, lens)
+    ours = shown_of(view.mesh, view.layout, view.levels, view.rotation, lens)
+    theirs = shown_of(whole, CanvasLayout(whole), levels, view.rotation, lens)
     assert ours.keys() == theirs.keys()
     for strip in theirs:
         for one, other in zip(ours[strip], theirs[strip], strict=True):

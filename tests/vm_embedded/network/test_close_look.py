@@ -21,7 +21,7 @@ from tests.manifests import ball_manifest
 from vm_embedded.errors import ModelError
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.look_contract import LookContract
-from vm_embedded.network.look_test import LookTest
+from vm_embedded.network.look_example import LookTest
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 from vm_embedded.network.model_file import read_model
 
@@ -31,17 +31,16 @@ LOOK = small_look()
 PATCHES = random_patches(3)
 TEST = LookTest(PATCHES, small_answers(PATCHES))
 MANIFEST = ball_manifest_with_look(self_test=TEST)
-GLANCING = ball_manifest_with_look(glance=look_contract(size=16))
 
 
 @pytest.fixture
 def load(tmp_path):
     """Write a model file, read it, and load its look network."""
 
-    def loaded(look=LOOK, manifest=MANIFEST, glance=None):
+    def loaded(look=LOOK, manifest=MANIFEST):
         path = tmp_path / "model.onnx"
-        path.write_bytes(model_with(look, manifest, glance))
-        return CloseLook.of(read_model(path))
+        path.write_bytes(model_with(look, manifest))
+        return CloseLook.of(read_model(path)).get("ball")
 
     return loaded
 
@@ -67,7 +66,7 @@ def test_a_look_answers_for_any_number_of_patches(load, count):
 
 def test_a_look_keeps_its_contract(load):
     contract = load().contract
-    assert replace(contract, self_test=None) == replace(MANIFEST.look, self_test=None)
+    assert replace(contract, self_test=None) == replace(MANIFEST.looks[0], self_test=None)
     np.testing.assert_array_equal(contract.self_test.patches, PATCHES)
 
 
@@ -79,48 +78,12 @@ def test_a_model_without_a_look_has_none(load):
     assert load(None, ball_manifest()) is None
 
 
-def test_a_glance_is_loaded_with_its_look(load):
-    look = load(LOOK, GLANCING, small_look(16))
-    assert look.glance.contract == GLANCING.look.glance
-    patches = random_patches(5, size=16)
-    np.testing.assert_allclose(look.glance.run(patches), small_answers(patches), atol=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("manifest", "glance", "message"),
-    [
-        (MANIFEST, small_look(16), "its metadata has a glance, its manifest has none"),
-        (GLANCING, None, "its manifest has a glance, its metadata has none"),
-        (GLANCING, "@@@@", "glance can't be read"),
-        (GLANCING, small_look(8), "glance: its inputs and outputs are"),
-    ],
-    ids=str,
-)
-def test_a_glance_that_does_not_fit_is_refused(load, manifest, glance, message):
-    assert message in refusal(load, LOOK, manifest, glance)
-
-
-def test_a_glance_must_judge_the_same_thing_and_a_chain_has_three_networks():
-    with pytest.raises(ModelError, match=r"upright_radius 0.3 m, its glance 0 m; both must be the same"):
-        look_contract(upright_radius=0.3, glance=look_contract())
-    with pytest.raises(ModelError, match="class 'ball', its glance class 'goal'"):
-        look_contract(glance=look_contract(object_class="goal"))
-    chain = look_contract(glance=look_contract(glance=look_contract()))
-    assert chain.names == ("wide look", "close look", "glance")
-    assert len(chain.chain) == len(chain.keys) == 3
-    assert LookContract.from_dict(chain.as_dict()) == chain
-    with pytest.raises(ModelError, match="3 networks"):
-        look_contract(glance=chain)
-    with pytest.raises(ModelError, match="3 networks"):
-        LookContract.from_dict(chain.as_dict() | {"glance": chain.as_dict()})
-
-
 def test_the_self_test_catches_other_weights(load):
     model = onnx.load_from_string(LOOK)
     (mixture,) = model.graph.initializer
     changed = 1.1 * onnx.numpy_helper.to_array(mixture)
     mixture.CopyFrom(onnx.numpy_helper.from_array(changed.astype(np.float32), mixture.name))
-    assert "close look: self-test failed" in refusal(load, model.SerializeToString())
+    assert "close look at ball: self-test failed" in refusal(load, model.SerializeToString())
 
 
 @pytest.mark.parametrize("weight", [np.nan, np.inf])
@@ -142,15 +105,15 @@ def test_the_self_test_catches_answers_that_are_not_numbers(load):
 @pytest.mark.parametrize(
     ("look", "manifest", "message"),
     [
-        (None, MANIFEST, "its manifest has a close look, its metadata has none"),
-        (LOOK, ball_manifest(), "its metadata has a close look, its manifest has none"),
+        (None, MANIFEST, "its manifest has a close look at ball, its metadata has none"),
+        (LOOK, ball_manifest(), "its metadata has visual_mesh_look_ball, its manifest has no such close look"),
         ("", MANIFEST, "not an ONNX file"),
-        ("AAA", MANIFEST, "close look can't be read"),
-        ("@@@@", MANIFEST, "close look can't be read"),
-        ("größer", MANIFEST, "close look can't be read"),
+        ("AAA", MANIFEST, "close look at ball can't be read"),
+        ("@@@@", MANIFEST, "close look at ball can't be read"),
+        ("größer", MANIFEST, "close look at ball can't be read"),
         (b"no graph", MANIFEST, "not an ONNX file"),
-        (LOOK[: len(LOOK) // 2], MANIFEST, "close look can't be read: not an ONNX file"),
-        (LOOK[:-1], MANIFEST, "close look can't be read: not an ONNX file"),
+        (LOOK[: len(LOOK) // 2], MANIFEST, "close look at ball can't be read: not an ONNX file"),
+        (LOOK[:-1], MANIFEST, "close look at ball can't be read: not an ONNX file"),
         (small_look(size=16), MANIFEST, "its inputs and outputs are"),
         (small_look(width=3), MANIFEST, "its inputs and outputs are"),
         (model_with(None, MANIFEST), MANIFEST, "its inputs and outputs are"),
@@ -167,26 +130,26 @@ def test_external_data_in_a_look_is_refused(load):
     mixture.ClearField("raw_data")
     mixture.data_location = onnx.TensorProto.EXTERNAL
     mixture.external_data.add(key="location", value="secret.bin")
-    assert "close look can't be read: refers to external data" in refusal(load, model.SerializeToString())
+    assert "close look at ball can't be read: refers to external data" in refusal(load, model.SerializeToString())
 
 
 def test_a_look_that_onnx_runtime_can_not_load_is_refused(load):
     model = onnx.load_from_string(LOOK)
     model.graph.node[0].op_type = "NoSuchOperator"
-    assert "close look: ONNX Runtime can't load it" in refusal(load, model.SerializeToString())
+    assert "close look at ball: ONNX Runtime can't load it" in refusal(load, model.SerializeToString())
 
 
 @pytest.mark.parametrize("name", ["goal", "other", "Ball"])
-def test_a_look_for_another_class_than_the_objects_is_refused(name):
-    with pytest.raises(ModelError, match=rf"judges class '{name}'.*kind object are \['ball'\]"):
-        ball_manifest("ball", "other", "goal:upright", look=look_contract(object_class=name))
+def test_a_look_for_a_class_without_peaks_is_refused(name):
+    with pytest.raises(ModelError, match=rf"close looks at \['{name}'\].*peaks for \['ball'\]"):
+        replace(MANIFEST, looks=(look_contract(object_class=name),))
 
 
 def from_json(**changes):
     """The manifest after changes in the JSON of its look; an Ellipsis takes an entry away."""
     data = json.loads(MANIFEST.as_json())
-    look = data["look"] | changes
-    data["look"] = {key: value for key, value in look.items() if value is not ...}
+    look = data["looks"][0] | changes
+    data["looks"] = [{key: value for key, value in look.items() if value is not ...}]
     return Manifest.from_json(json.dumps(data))
 
 
@@ -196,11 +159,6 @@ def test_a_missing_entry_is_refused(entry):
         from_json(**{entry: ...})
 
 
-def test_a_look_that_no_score_counts_for_has_no_weight_as_before():
-    assert "mesh_weight" not in look_contract().as_dict()
-    assert from_json(mesh_weight=0).look.as_dict() == from_json().look.as_dict()
-
-
 def test_an_unknown_entry_is_refused():
     with pytest.raises(ModelError, match="'depth'"):
         from_json(depth=3)
@@ -208,7 +166,7 @@ def test_an_unknown_entry_is_refused():
 
 @pytest.mark.parametrize("look", [[], 1, "look", True, {}])
 def test_a_look_that_is_no_table_is_refused(look):
-    data = json.loads(MANIFEST.as_json()) | {"look": look}
+    data = json.loads(MANIFEST.as_json()) | {"looks": [look]}
     with pytest.raises(ModelError, match="must have the entries"):
         Manifest.from_json(json.dumps(data))
 
@@ -226,12 +184,9 @@ def test_a_look_that_is_no_table_is_refused(look):
         ("extent", 9),
         ("extent", True),
         ("extent", float("nan")),
-        ("above", -0.1),
-        ("above", 1.0),
-        ("above", None),
-        ("passes", 0),
-        ("passes", 5),
-        ("passes", True),
+        ("max_proposals", 0),
+        ("max_proposals", 129),
+        ("max_proposals", None),
         ("mesh_weight", 2.1),
         ("mesh_weight", -0.1),
         ("mesh_weight", True),
@@ -265,8 +220,7 @@ def contracts(draw):
     return look_contract(
         size=size,
         extent=draw(reals(0.5, 8.0)),
-        above=draw(reals(0.0, 0.99)),
-        passes=draw(st.integers(1, 4)),
+        max_proposals=draw(st.integers(1, 128)),
         mesh_weight=draw(st.just(0.0) | reals(0.0, 2.0)),
         channels=tuple(draw(st.lists(st.integers(1, 99), max_size=4))),
         self_test=draw(st.sampled_from([None, test])),
@@ -290,14 +244,14 @@ json_values = st.recursive(
 )
 
 
-@given(st.sampled_from(sorted(look_contract(mesh_weight=1.0).as_dict())), json_values)
+@given(st.sampled_from(sorted(look_contract().as_dict())), json_values)
 def test_any_value_of_an_entry_is_read_or_refused_with_a_model_error(entry, value):
-    found = attempt(ModelError, LookContract.from_dict, MANIFEST.look.as_dict() | {entry: value})
+    found = attempt(ModelError, LookContract.from_dict, MANIFEST.looks[0].as_dict() | {entry: value})
     assert isinstance(found, LookContract | ModelError)
 
 
 def test_the_look_is_in_the_manifest_s_json():
     data = json.loads(MANIFEST.as_json())
-    assert data["look"]["size"] == 8
+    assert data["looks"][0]["size"] == 8
     assert METADATA_KEY not in data
-    assert json.loads(ball_manifest().as_json())["look"] is None
+    assert json.loads(ball_manifest().as_json())["looks"] == []

@@ -15,7 +15,7 @@ from onnx import TensorProto, helper, numpy_helper
 from tests.vm_embedded.cli.commands import one_complaint, run
 from vm_embedded.errors import ModelError
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.look_contract import GLANCE_KEY, LOOK_KEY
+from vm_embedded.network.look_contract import look_key
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.onnx_model import OnnxModel
 
@@ -27,8 +27,8 @@ LARGE = 0x01520028
 """Where the second network begins, in the file that is two [bytes]: the first bytes of the file are its address."""
 
 
-def ball_small():
-    return onnx.load(model_path("ball-small"))
+def ball():
+    return onnx.load(model_path("ball"))
 
 
 def identity(inputs, outputs, kind):
@@ -40,7 +40,7 @@ def identity(inputs, outputs, kind):
 
 def endless_loop():
     """The last answer goes through a loop whose condition stays true."""
-    made = ball_small()
+    made = ball()
     last = next(node for node in made.graph.node if "probabilities" in node.output)
     last.output[0] = "before"
     body = identity(["condition", "value"], ["condition_out", "value_out"], TensorProto.FLOAT)
@@ -53,14 +53,14 @@ def endless_loop():
 
 
 def condition():
-    made = ball_small()
+    made = ball()
     branch = helper.make_graph([], "branch", [], [])
     made.graph.node.append(helper.make_node("If", ["yes"], ["nothing"], then_branch=branch, else_branch=branch))
     return made
 
 
 def scan():
-    made = ball_small()
+    made = ball()
     body = identity(["a"], ["b"], TensorProto.FLOAT)
     made.graph.node.append(helper.make_node("Scan", ["points"], ["nothing"], body=body, num_scan_inputs=1))
     return made
@@ -68,7 +68,7 @@ def scan():
 
 def nested_functions():
     """Each function calls the next one twice, so the graph doubles at each of 40 levels."""
-    made = ball_small()
+    made = ball()
     for level in range(40):
         inner = [helper.make_node(f"F{level + 1}", [a], [b], domain="own") for a, b in ("xy", "yz")]
         opsets = [helper.make_opsetid("own", 1)]
@@ -77,7 +77,7 @@ def nested_functions():
 
 
 def training():
-    made = ball_small()
+    made = ball()
     made.training_info.add()
     return made
 
@@ -101,7 +101,7 @@ def test_attack_3_models_that_never_end_are_refused_before_they_are_loaded(made,
 
 def test_attack_3_a_file_of_millions_of_tiny_fields_is_refused(tmp_path):
     path = tmp_path / "model.onnx"
-    path.write_bytes(model_path("ball-small").read_bytes() + b"\x28\x01" * 4_000_000)
+    path.write_bytes(model_path("ball").read_bytes() + b"\x28\x01" * 4_000_000)
     with pytest.raises(ModelError, match="more than 500000 fields"):
         read_model(path)
 
@@ -150,7 +150,7 @@ def test_attack_7_the_model_that_was_checked_is_the_one_that_runs(tmp_path):
 
 
 def test_attack_10_a_damaged_model_prints_nothing_to_standard_output(capfd):
-    whole, chance = model_path("ball-small").read_bytes(), random.Random(3)
+    whole, chance = model_path("ball").read_bytes(), random.Random(3)
     refused = 0
     for _ in range(200):
         content = bytearray(whole)
@@ -194,9 +194,9 @@ def weights_of(model, key):
 
 
 @pytest.mark.parametrize("value", [0.0, math.nan, None], ids=["zero", "NaN", "random"])
-@pytest.mark.parametrize("key", [None, LOOK_KEY, GLANCE_KEY])
+@pytest.mark.parametrize("key", [None, look_key("ball")])
 def test_attack_1_a_network_with_other_weights_is_refused_by_vm_detect(key, value, tmp_path):
-    made = ball_small()
+    made = ball()
     network, store = weights_of(made, key)
     for each in network.graph.initializer:
         if each.data_type == TensorProto.FLOAT and "kernel" in each.name:
@@ -210,7 +210,7 @@ def test_attack_1_a_network_with_other_weights_is_refused_by_vm_detect(key, valu
 
 
 def test_a_file_is_sealed_once_and_its_seal_covers_all_else():
-    content = model_path("ball-small").read_bytes()
+    content = model_path("ball").read_bytes()
     model = onnx.load_from_string(content)
     seal = model.metadata_props.pop()
     assert seal.key == SEAL_KEY

@@ -1,4 +1,4 @@
-"""All layouts give the same answers, torch's, and hold what they say."""
+"""The layout of networks on graphs gives torch's answers, and holds what it says."""
 
 import math
 from pathlib import Path
@@ -16,12 +16,10 @@ from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.sphere import Sphere
-from vm_embedded.mesh.mesh import SELF, Mesh
+from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.model_file import ModelFile
-from vm_embedded.network.plain_layout import PlainLayout
-from vm_embedded.network.runs_layout import RunsLayout
 from vm_embedded.network.session import Session
 from vm_export.export import onnx_model
 from vm_export.network import Network
@@ -34,9 +32,6 @@ LARGEST_LOGIT = 2.0
 
 MODELS = ["ring4", "ring6", "ring8", "cap6", "xygrid4", "xmgrid6", "xygrid8"]
 """Of every arrangement and number of neighbors one; those with equal neighbors are laid out alike."""
-
-LAYOUTS = ("plain", "runs")
-"""Those of networks on graphs. Networks on a canvas have no other layout."""
 
 models = st.sampled_from(MODELS)
 kinds = st.sampled_from(["convolution", "separable", "dense"])
@@ -63,9 +58,9 @@ def network_of(shape, seed):
     return network
 
 
-def manifest_of(model, layout="plain", classes=2, **changes):
+def manifest_of(model, classes=2, **changes):
     names = (f"class{number}:object" for number in range(classes))
-    return ball_manifest(*names, mesh=model, layout=layout, **changes)
+    return ball_manifest(*names, mesh=model, **changes)
 
 
 @st.composite
@@ -134,21 +129,15 @@ def tamed(network, logits):
 
 
 def answers(session, mesh, colors, on_screen):
-    """Probabilities (m, C) of all slots, and their layout. What is off screen gets no color at all."""
+    """Probabilities (k, C) of the points on screen. What is off screen gets no color at all."""
     layout = choose_layout(mesh, session.model.manifest)
-    shown = np.append(on_screen, False)[layout.slots]
-    return session.run(layout, slot_colors(layout, colors, shown), shown), layout
+    shown = np.where(on_screen, colors.T, np.nan).astype(np.float32)
+    return session.run(layout, shown, on_screen, np.flatnonzero(on_screen))
 
 
-def slot_colors(layout, colors, shown):
-    """Colors (3, m) of a layout's slots, from those of points (n, 3); NaN for slots that are not shown (m,)."""
-    padded = np.vstack([colors, np.zeros((1, 3))]).astype(np.float32)
-    return np.where(shown, padded[layout.slots].T, np.float32(np.nan))
-
-
-def session_of(network, model, layout, **changes):
-    manifest = manifest_of(model, layout, network.shape.classes, **changes)
-    return Session(ModelFile(Path(f"{layout}.onnx"), onnx_model(network, manifest), manifest, ""))
+def session_of(network, model, **changes):
+    manifest = manifest_of(model, network.shape.classes, **changes)
+    return Session(ModelFile(Path("model.onnx"), onnx_model(network, manifest), manifest, ""))
 
 
 def logits_of(probabilities, head):
@@ -162,48 +151,39 @@ def _centered(logits):
 
 
 def assert_same_answers(network, model, mesh, on_screen, seed):
-    """All layouts, and torch, agree on the logits of every point on screen."""
+    """ONNX Runtime and torch agree on the logits of every point on screen."""
     head = network.shape.layers[-1].activation
     colors = np.random.default_rng(seed).random((len(mesh), 3))
     expected = tamed(network, torch_logits(network, mesh, colors, on_screen))
-    found = {}
-    for layout in LAYOUTS:
-        probabilities, arranged = answers(session_of(network, model, layout), mesh, colors, on_screen)
-        assert probabilities.shape == (len(arranged.slots), network.shape.classes)
-        found[layout] = logits_of(probabilities[arranged.places][on_screen], head)
-        assert np.isfinite(found[layout]).all()
-        copies = probabilities[np.append(on_screen, False)[arranged.slots]]
-        first = probabilities[arranged.places[arranged.slots[np.append(on_screen, False)[arranged.slots]]]]
-        np.testing.assert_allclose(copies, first, atol=1e-6, err_msg="a copy of a point has another answer")
-    np.testing.assert_allclose(found["runs"], found["plain"], rtol=0, atol=1e-5)
-    reference = expected if head == "sigmoid" else _centered(expected)
-    for layout in found:
-        np.testing.assert_allclose(found[layout], reference, rtol=0, atol=1e-5, err_msg=layout)
+    probabilities = answers(session_of(network, model), mesh, colors, on_screen)
+    assert probabilities.shape == (on_screen.sum(), network.shape.classes)
+    found = logits_of(probabilities, head)
+    assert np.isfinite(found).all()
+    np.testing.assert_allclose(found, expected if head == "sigmoid" else _centered(expected), rtol=0, atol=1e-5)
 
 
 @given(st.data(), models, seeds)
-def test_all_layouts_give_the_same_answers_on_any_graph(data, model, seed):
+def test_the_graph_gives_torch_s_answers_on_any_graph(data, model, seed):
     network = network_of(data.draw(network_shapes(model)), seed)
     mesh = data.draw(random_meshes(MESH_MODELS[model].neighbors))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh))), seed)
 
 
 @given(st.data(), models, seeds)
-def test_all_layouts_give_the_same_answers_on_ring_meshes(data, model, seed):
+def test_the_graph_gives_torch_s_answers_on_ring_meshes(data, model, seed):
     network = network_of(data.draw(network_shapes(model)), seed)
     mesh, seen = data.draw(ring_meshes(model))
     assert_same_answers(network, model, mesh, data.draw(masks(len(mesh), seen)), seed)
 
 
 WHOLE = {model: build_mesh(Sphere(0.1), 0.8, 1.5, 2.0, model) for model in MODELS}
-in_all_layouts = pytest.mark.parametrize("layout", LAYOUTS)
 for_all_models = pytest.mark.parametrize("model", MODELS)
 
 
 @pytest.mark.parametrize("head", [(2, "softmax"), (3, "softmax"), (5, "softmax"), (2, "sigmoid")], ids=str)
 @pytest.mark.parametrize("activation", sorted(ACTIVATIONS))
 @for_all_models
-def test_all_layouts_give_the_same_answers_with_every_activation_and_head(model, activation, head):
+def test_the_graph_gives_torch_s_answers_with_every_activation_and_head(model, activation, head):
     layers = (
         Layer("convolution", 6, activation),
         Layer("separable", 5, activation),
@@ -218,14 +198,14 @@ def test_all_layouts_give_the_same_answers_with_every_activation_and_head(model,
 @for_all_models
 @pytest.mark.parametrize("count", [0, 1])
 @pytest.mark.parametrize("shown", [False, True])
-def test_all_layouts_take_a_mesh_of_no_point_or_of_one(model, count, shown):
+def test_the_graph_takes_a_mesh_of_no_point_or_of_one(model, count, shown):
     network = network_of(NetworkShape.uniform(3, 4, 3, neighbors=MESH_MODELS[model].neighbors), 0)
     mesh = WHOLE[model].part(np.arange(count))
     assert_same_answers(network, model, mesh, np.full(count, shown), 0)
 
 
 @for_all_models
-def test_all_layouts_take_a_frame_in_which_nothing_is_on_screen(model):
+def test_the_graph_takes_a_frame_in_which_nothing_is_on_screen(model):
     network = network_of(NetworkShape.uniform(3, 4, 2, neighbors=MESH_MODELS[model].neighbors), 0)
     assert_same_answers(network, model, WHOLE[model], np.zeros(len(WHOLE[model]), dtype=bool), 0)
 
@@ -238,15 +218,11 @@ def test_a_layout_is_used_for_one_frame_after_the_other(data, model, seed):
     mesh, seen = data.draw(ring_meshes(model))
     colors = np.random.default_rng(seed).random((2, len(mesh), 3)).astype(np.float32)
     shown = [data.draw(masks(len(mesh), seen)) for _ in range(2)]
-    for layout in LAYOUTS:
-        session = session_of(network, model, layout)
-        arranged = choose_layout(mesh, session.model.manifest)
-        for each, on_screen in zip(colors, shown, strict=True):
-            fresh, _ = answers(session, mesh, each, on_screen)
-            everywhere = np.vstack([each, np.full((1, 3), 7.0, dtype=np.float32)])[arranged.slots].T
-            again = session.run(arranged, everywhere, np.append(on_screen, False)[arranged.slots])
-            where = arranged.places[on_screen]
-            np.testing.assert_array_equal(again[where], fresh[where])
+    session = session_of(network, model)
+    arranged = choose_layout(mesh, session.model.manifest)
+    for each, on_screen in zip(colors, shown, strict=True):
+        again = session.run(arranged, each.T, on_screen, np.flatnonzero(on_screen))
+        np.testing.assert_array_equal(again, answers(session, mesh, each, on_screen))
 
 
 @given(st.data(), models, seeds)
@@ -260,93 +236,44 @@ def test_the_edge_policy_same_links_what_is_off_screen_to_the_point_itself(data,
     itself = np.arange(len(kept) + 1, dtype=np.int32)[:, None]
     alone = Mesh(part.rays, np.where(part.neighbors == len(kept), itself, part.neighbors))
     expected = tamed(network, torch_logits(network, alone, colors[kept], np.ones(len(kept), dtype=bool)))
-    probabilities, layout = answers(session_of(network, model, "plain", edge="same"), mesh, colors, on_screen)
+    probabilities = answers(session_of(network, model, edge="same"), mesh, colors, on_screen)
     head = network.shape.layers[-1].activation
     reference = expected if head == "sigmoid" else _centered(expected)
-    found = logits_of(probabilities[layout.places][on_screen], head)
+    found = logits_of(probabilities, head)
     np.testing.assert_allclose(found, reference, rtol=0, atol=1e-5)
 
 
-def arrays_of(layout):
-    links = layout.columns if isinstance(layout, RunsLayout) else layout._neighbors
-    return [layout.slots, layout.places, layout.original, layout.rays, links]
-
-
-@in_all_layouts
 @for_all_models
-def test_what_a_layout_holds_is_read_only_and_counted(layout, model):
-    arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
-    for array in arrays_of(arranged):
-        assert not array.flags.writeable
-        with pytest.raises(ValueError, match="read-only"):
-            array[:1] = 0
-    assert arranged.nbytes == sum(array.nbytes for array in arrays_of(arranged))
-    held = sum(each.nbytes for each in vars(arranged).values() if isinstance(each, np.ndarray | Mesh))
-    assert 0 <= held - arranged.nbytes <= 100  # a number for each group is too little to count
-
-
-@in_all_layouts
-@for_all_models
-def test_rays_are_column_by_column_in_memory(layout, model):
-    """As of every mesh; each frame's projection goes through them by columns."""
+def test_rays_are_column_by_column_in_memory(model):
+    """Each frame's projection goes through them by columns."""
     for mesh in (WHOLE[model], WHOLE[model].part(np.arange(50, 230))):
-        assert choose_layout(mesh, manifest_of(model, layout)).rays.T.flags.c_contiguous
-
-
-@for_all_models
-def test_plain_is_the_mesh_as_it_is(model):
-    layout = choose_layout(WHOLE[model], manifest_of(model))
-    assert isinstance(layout, PlainLayout)
-    assert layout.rays is WHOLE[model].rays
-    np.testing.assert_array_equal(layout.links(layout.places), WHOLE[model].neighbors[:-1])
-    np.testing.assert_array_equal(layout.slots, np.arange(len(WHOLE[model])))
-    np.testing.assert_array_equal(layout.places, layout.slots)
-    assert layout.original.all()
-
-
-@for_all_models
-def test_every_neighbor_and_the_point_itself_are_in_exactly_one_group(model):
-    together = sorted(each for group in MESH_MODELS[model].groups for each in group)
-    assert together == [SELF, *range(MESH_MODELS[model].neighbors)]
-    assert MESH_MODELS[model].groups[0][1] == SELF
-    assert all(1 <= len(group) <= 3 for group in MESH_MODELS[model].groups)
+        assert mesh.rays.T.flags.c_contiguous
 
 
 @for_all_models
 def test_feeds_have_the_colors_on_screen_and_change_none_of_what_they_take(model):
     """The network's inputs are contiguous, of the types that its file asks for, and in range whatever is on screen."""
     random = np.random.default_rng(2)
-    for layout in LAYOUTS:
-        arranged = choose_layout(WHOLE[model], manifest_of(model, layout))
-        m = len(arranged.slots)
-        on_screen = np.append(random.random(len(WHOLE[model])) < 0.7, False)[arranged.slots]
-        colors = random.random((3, m), dtype=np.float32)
-        before = colors.copy()
-        feeds = arranged.feeds(colors, on_screen)
-        np.testing.assert_array_equal(colors, before)
-        points = feeds["points"]
-        assert (points.dtype, points.flags.c_contiguous) == (np.float32, True)
-        found = points[:-1].T if layout == "plain" else points
-        np.testing.assert_array_equal(found[:, on_screen], colors[:, on_screen])
-        if layout == "plain":
-            assert set(feeds) == {"points", "neighbors"}
-            assert feeds["neighbors"].dtype == np.int32
-            assert feeds["neighbors"].shape == (m + 1, MESH_MODELS[model].neighbors)
-            assert 0 <= feeds["neighbors"].min() <= feeds["neighbors"].max() <= m
-            np.testing.assert_array_equal(points[-1], [-1.0] * 3)
-            continue
-        np.testing.assert_array_equal(points[:, ~on_screen], -1.0)
-        assert set(feeds) == {"points", "columns"}
-        assert feeds["columns"].dtype == np.int64
-        assert feeds["columns"].shape == (len(MESH_MODELS[model].groups), m)
-        assert 0 <= feeds["columns"].min() <= feeds["columns"].max() < len(MESH_MODELS[model].groups) * (m - 1)
+    arranged = choose_layout(WHOLE[model], manifest_of(model))
+    m = len(WHOLE[model])
+    on_screen = random.random(m) < 0.7
+    colors = random.random((3, m), dtype=np.float32)
+    before = colors.copy()
+    feeds = arranged.feeds(colors, on_screen)
+    np.testing.assert_array_equal(colors, before)
+    assert set(feeds) == {"points", "neighbors"}
+    points, neighbors = feeds["points"], feeds["neighbors"]
+    assert (points.dtype, points.flags.c_contiguous) == (np.float32, True)
+    np.testing.assert_array_equal(points[:-1].T[:, on_screen], colors[:, on_screen])
+    np.testing.assert_array_equal(points[-1], [-1.0] * 3)
+    assert (neighbors.dtype, neighbors.shape) == (np.int32, (m + 1, MESH_MODELS[model].neighbors))
+    assert 0 <= neighbors.min() <= neighbors.max() <= m
 
 
-@in_all_layouts
-def test_answers_that_are_not_finite_are_an_error(layout):
+def test_answers_that_are_not_finite_are_an_error():
     network = network_of(NetworkShape((Layer("convolution", 4, "elu"), Layer("convolution", 2, "softmax")), 6), 1)
     mesh = build_mesh(Sphere(0.1), 0.8, 2.0, 1.0, "xmgrid6")
-    session = session_of(network, "xmgrid6", layout)
+    session = session_of(network, "xmgrid6")
     colors, on_screen = np.zeros((len(mesh), 3)), np.arange(len(mesh)) > 0
     answers(session, mesh, colors, on_screen)
     colors[1] = np.nan

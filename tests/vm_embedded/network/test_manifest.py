@@ -8,21 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.looks import look_contract
-from tests.manifests import MESHES, ball_manifest
+from tests.manifests import ball_manifest
 from vm_embedded.errors import GeometryError, InputError, ModelError
 from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.geometry.sphere import Sphere
 from vm_embedded.mesh.models import MESH_MODELS
+from vm_embedded.network.example import SelfTest
 from vm_embedded.network.manifest import (
     EDGES,
     FORMAT_VERSION,
     KINDS,
-    LAYOUTS,
     Manifest,
     ObjectClass,
 )
-from vm_embedded.network.self_test import SelfTest
 
 from ..strategies import attempt, class_names, printable, reals, seeds
 
@@ -46,31 +45,24 @@ classes = st.lists(
     unique_by=lambda each: each.name,
 ).map(tuple)
 
-orders = st.sampled_from(
-    [(edge, layout) for edge in EDGES for layout in LAYOUTS if edge == "hard" or layout == "plain"]
-)
-"""Edges and the layouts that there are for them."""
 
-
-def _manifest(order, tall, **entries):
-    """A cylinder has a height; layout canvas needs its mesh."""
-    edge, layout = order
-    if layout == "canvas":
+def _manifest(edge, tall, **entries):
+    """A cylinder has a height; mesh octaves has one edge, and peaks."""
+    if entries["mesh"] == "octaves":
+        edge = "hard"
         entries["peaks"] = tuple(each.name for each in entries["classes"][::-1] if each.kind in ("object", "upright"))
-    mesh = entries.pop("mesh") if layout in ("plain", "runs") else MESHES[layout]
-    entries = entries | {"mesh": mesh, "object_height": tall if entries["shape"] == "cylinder" else 0.0}
-    return Manifest(edge=edge, layout=layout, **entries)
+    return Manifest(edge=edge, object_height=tall if entries["shape"] == "cylinder" else 0.0, **entries)
 
 
 manifests = st.builds(
     _manifest,
-    order=orders,
+    edge=st.sampled_from(EDGES),
     tall=reals(0.01, 3.0),
     shape=st.sampled_from(sorted(SHAPES)),
     radius=reals(1e-3, 10.0),
     object_radius=reals(1e-3, 10.0),
     intersections=reals(0.1, 20.0),
-    mesh=st.sampled_from(sorted(set(MESH_MODELS) - {"wall6", "octaves"})),
+    mesh=st.sampled_from(sorted(set(MESH_MODELS) - {"wall6"})),
     max_distance=reals(0.1, 100.0),
     classes=classes,
     self_test=st.one_of(st.none(), self_tests()),
@@ -136,30 +128,12 @@ def test_a_missing_entry_is_refused_by_name(entry):
         Manifest.from_json(changed(**{entry: ...}))
 
 
-def test_files_without_peaks_lack_their_entry_as_before():
-    assert "peaks" not in json.loads(BALL.as_json())
+def test_octaves_need_edge_hard():
+    with pytest.raises(ModelError, match="mesh octaves needs edge hard, not same"):
+        Manifest.from_json(changed(mesh="octaves", edge="same"))
 
 
-@pytest.mark.parametrize(
-    ("entries", "said"),
-    [
-        *(
-            ({"layout": layout, "mesh": mesh}, f"the mesh is {mesh}, the layout {layout}")
-            for layout, mesh in (
-                ("plain", "octaves"),
-                ("runs", "octaves"),
-                ("canvas", "xygrid6"),
-            )
-        ),
-        ({"layout": "canvas", "mesh": "octaves", "edge": "same"}, "canvas"),
-    ],
-)
-def test_a_layout_and_a_mesh_that_do_not_fit_are_refused(entries, said):
-    with pytest.raises(ModelError, match=said):
-        Manifest.from_json(changed(**entries))
-
-
-STRIPS = ball_manifest("ball", "goal:upright", "line", "other", mesh="octaves", layout="canvas")
+STRIPS = ball_manifest("ball", "goal:upright", "line", "other", mesh="octaves")
 
 
 def test_peaks_are_outputs_after_the_classes():
@@ -188,18 +162,9 @@ def test_impossible_peaks_are_refused(peaks, said):
         Manifest.from_json(json.dumps(data))
 
 
-@pytest.mark.parametrize("layout", ["plain", "runs"])
-def test_other_layouts_have_no_peaks(layout):
-    with pytest.raises(ModelError, match=f"peaks.*canvas.*{layout}"):
-        ball_manifest("ball", layout=layout, mesh=MESHES[layout], peaks=("ball",))
-
-
-def test_a_look_counts_scores_only_of_classes_with_peaks():
-    weighing = look_contract(mesh_weight=0.4)
-    assert replace(STRIPS, peaks=("ball",), look=weighing).look.mesh_weight == 0.4
-    for peaks in ((), ("goal",)):
-        with pytest.raises(ModelError, match=r"'ball'.*mesh_weight.*0\.4"):
-            replace(STRIPS, peaks=peaks, look=weighing)
+def test_other_meshes_have_no_peaks():
+    with pytest.raises(ModelError, match=r"peaks need mesh octaves, not ring6"):
+        ball_manifest("ball", peaks=("ball",))
 
 
 def test_an_unknown_entry_names_itself_and_the_nearest_known_one():
@@ -232,8 +197,6 @@ def test_json_that_is_no_table_is_refused(text):
         ("shape", "Sphere", "sphere"),
         ("mesh", "ring5", "ring6"),
         ("edge", "herd", "hard"),
-        ("layout", "plane", "plain"),
-        ("layout", "rows", "runs"),
         ("channels", "bgr", "rgb"),
         ("sampling", "linear", "bilinear"),
     ],
@@ -275,13 +238,6 @@ def test_operations_are_a_whole_number(wrong):
 def test_another_scale_of_colors_is_refused(scale):
     with pytest.raises(ModelError, match="1/255"):
         Manifest.from_json(changed(scale=scale))
-
-
-def test_runs_are_refused_for_missing_neighbors_that_are_the_point_itself():
-    assert Manifest.from_json(changed(layout="runs")).layout == "runs"
-    assert Manifest.from_json(changed(edge="same")).layout == "plain"
-    with pytest.raises(ModelError, match="runs needs edge hard"):
-        Manifest.from_json(changed(layout="runs", edge="same"))
 
 
 ONE = {"name": "ball", "kind": "object"}
@@ -400,38 +356,38 @@ def test_a_manifest_for_a_camera_below_the_ball_has_no_spacing():
         BALL.mesh_shape.spacing(0.15)
 
 
-FIELD = tuple(ObjectClass(name, kind) for name, kind in (("ball", "object"), ("goal", "upright"), ("line", "area")))
-
-
 def upright_look(name="goal", **changes):
     return look_contract(**{"object_class": name, "upright_radius": 0.3} | changes)
 
 
-def test_looks_at_uprights_round_trip():
-    manifest = replace(BALL, classes=FIELD, upright_looks=(upright_look(),))
+def test_looks_round_trip():
+    manifest = replace(STRIPS, peaks=("ball", "goal"), looks=(look_contract(mesh_weight=0.4), upright_look()))
     assert Manifest.from_json(manifest.as_json()) == manifest
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("look", "message"),
     [
-        ({"upright_looks": (upright_look("ball"),)}, r"\['ball'\], but the classes of kind upright are \['goal'\]"),
-        ({"upright_looks": (upright_look("pole"),)}, r"\['pole'\]"),
-        ({"upright_looks": (upright_look(), upright_look())}, r"\['goal', 'goal'\]"),
-        ({"upright_looks": (upright_look(upright_radius=0.0),)}, "upright_radius of at least 0.01 m, not 0 m"),
-        ({"upright_looks": (upright_look(upright_radius=1e-300),)}, "upright_radius of at least 0.01 m"),
-        ({"look": look_contract(upright_radius=0.3)}, "it must be 0"),
+        (upright_look("line"), r"\['line'\], but the network has peaks for \['ball', 'goal'\]"),
+        (upright_look(upright_radius=0.0), "upright_radius of at least 0.01 m, not 0 m"),
+        (upright_look(upright_radius=1e-300), "upright_radius of at least 0.01 m"),
+        (look_contract(upright_radius=0.3), "it must be 0"),
     ],
 )
-def test_looks_at_uprights_that_make_no_sense_are_refused(changes, message):
+def test_looks_that_make_no_sense_are_refused(look, message):
     with pytest.raises(ModelError, match=message):
-        replace(BALL, classes=FIELD, **changes)
+        replace(STRIPS, peaks=("ball", "goal"), looks=(look,))
+
+
+def test_two_looks_at_a_class_are_refused():
+    with pytest.raises(ModelError, match=r"\['goal', 'goal'\]"):
+        replace(STRIPS, peaks=("ball", "goal"), looks=(upright_look(), upright_look()))
 
 
 @pytest.mark.parametrize("wrong", [None, {}, 3, "goal"])
-def test_looks_at_uprights_that_are_no_list_are_refused(wrong):
-    with pytest.raises(ModelError, match="upright_looks"):
-        Manifest.from_json(changed(upright_looks=wrong))
+def test_looks_that_are_no_list_are_refused(wrong):
+    with pytest.raises(ModelError, match="looks"):
+        Manifest.from_json(changed(looks=wrong))
 
 
 def test_operations_beyond_all_networks_are_refused():

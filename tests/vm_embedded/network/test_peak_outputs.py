@@ -11,16 +11,14 @@ from vm_embedded import Detector, Orientation
 from vm_embedded.errors import ModelError
 from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_embedded.network.choose_layout import choose_layout
+from vm_embedded.network.example import SelfTest
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import parse_model, sealed
-from vm_embedded.network.self_test import SelfTest
 from vm_embedded.network.session import Session
 
 from ..strategies import SIZE
 
-MANIFEST = ball_manifest(
-    "ball", "goal:upright", "other", mesh="octaves", layout="canvas", max_distance=4.0, peaks=("goal", "ball")
-)
+MANIFEST = ball_manifest("ball", "goal:upright", "other", mesh="octaves", max_distance=4.0, peaks=("goal", "ball"))
 LENS = Equisolid(focal_length=220.0, fov=2.6)
 KERNEL = np.zeros((MANIFEST.outputs, 4))
 """Red is the score of balls, green that of posts, and blue their size. Nothing is shifted."""
@@ -60,11 +58,12 @@ def test_a_session_gives_all_outputs():
     session = Session(model(replace(MANIFEST, self_test=self_test())))
     mesh = MANIFEST.model.build(MANIFEST.mesh_shape, 0.6, 4.0, 4.0)
     layout = choose_layout(mesh, MANIFEST)
-    shown = layout.slots < len(mesh)
-    colors = np.random.default_rng(1).random((3, len(layout)), dtype=np.float32)
-    found = session.run(layout, colors, shown)
-    assert found.shape == (len(layout), MANIFEST.outputs)
-    np.testing.assert_allclose(found[shown], (colors.T @ KERNEL[:, :3].T + BIAS)[shown], atol=1e-4)
+    random = np.random.default_rng(1)
+    colors, points = random.random((3, len(mesh)), dtype=np.float32), random.permutation(len(mesh))[:100]
+    spread = np.stack([layout.spread(each) for each in colors])
+    found = session.run(layout, spread, np.ones(len(mesh), dtype=bool), points)
+    assert found.shape == (100, MANIFEST.outputs)
+    np.testing.assert_allclose(found, (colors.T @ KERNEL[:, :3].T + KERNEL[:, 3] + BIAS)[points], atol=1e-4)
 
 
 def test_a_self_test_proves_the_peaks_too():
@@ -94,7 +93,7 @@ def test_peaks_are_where_the_picture_shows_something():
     seen = detector.observe(image, Orientation.from_roll_pitch(0.6, 0.05, 0.5, 1.0), LENS)
     assert seen.probabilities.shape == (len(seen), 3)
     for name, pixel in spots.items():
-        found = seen.find_peaks(name, 5)
+        found = seen.peaks[name].part(slice(5))
         assert len(found) == 1
         np.testing.assert_allclose(seen.view.ray_pixels(found.rays), [pixel], atol=8.0)
         np.testing.assert_allclose(found.log_sizes, 0.4, atol=0.01)

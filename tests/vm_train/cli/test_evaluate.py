@@ -14,8 +14,10 @@ import cv2
 import pytest
 
 from tests.folders import contents
+from tests.looks import look_contract
 from tests.programs import BIN, heed_interrupts, run_program
 from tests.vm_export.looks import look_checkpoint
+from vm_embedded.network.bundled import model_path
 from vm_export.change_model import change_looks
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
@@ -101,35 +103,33 @@ def test_calibration_counts_all_objects_that_the_scores_count(evaluated):
 def looking(tmp_path_factory):
     """A model file with a close look of random weights."""
     path = tmp_path_factory.mktemp("looking") / "looking.onnx"
-    change_looks(MODEL, path, [look_checkpoint(seed=1)])
+    change_looks(model_path("ball"), path, [look_checkpoint(seed=1)])
     return path
 
 
 @pytest.mark.long
 def test_a_close_look_s_proposals_have_scores_of_their_own(capsys, looking, data, tmp_path):
     out = tmp_path / "out"
-    options = ("--radius-of", "scene", "--max-proposals", 7, "--min-confidence", 0)
+    options = ("--radius-of", "scene", "--min-confidence", 0)
     done = run(looking, data, "-o", out, "--workers", 2, *options)
     assert "proposals for class ball: " in done.stdout
-    assert "proposals.svg" in {path.name for path in (out / "plots").iterdir()}
     page = (out / "report.html").read_text()
     assert "<h2>Proposals for class ball</h2>" in page
-    assert 'alt="proposals"' in page
     scores = json.loads((out / "scores.json").read_text())
-    assert scores["about"]["model"]["close_look"].startswith("ball, 8 x 8 samples")
+    assert scores["about"]["model"]["close look at ball"].startswith("8 x 8 samples")
     found = scores["proposals"]["ball"]
     assert found["pictures"] == 8
-    assert 0.0 < found["mean_count"] <= found["largest_count"] <= 7
+    assert 0.0 < found["mean_count"] <= found["largest_count"] <= look_contract().max_proposals
     assert found["all"]["truths"] == scores["objects"]["ball"]["iou_0.5"]["all"]["truths"]
     with (out / "proposals.csv").open() as file:
-        rows = {(row["by"], row["bin"]): row for row in csv.DictReader(file)}
-    assert len(rows) == 1 + 20 + 7 + 5
-    for (by, place), row in rows.items():
-        expected = found["all"] if by == "all" else found[f"by_{by}"][place]
+        rows = {row["distance"]: row for row in csv.DictReader(file)}
+    assert len(rows) == 1 + 20
+    for place, row in rows.items():
+        expected = found[place]
         assert [float(row[key]) if row[key] else None for key in expected] == list(expected.values())
     again = tmp_path / "again"
     assert main([str(each) for each in (looking, data, "-o", again, "--workers", 1, *options)]) == 0
-    for name in ("scores.json", "proposals.csv", "report.html", "plots/proposals.svg"):
+    for name in ("scores.json", "proposals.csv", "report.html"):
         assert (out / name).read_bytes() == (again / name).read_bytes()
     assert "proposals for class ball" in capsys.readouterr().out
     assert main([str(MODEL), str(data), "-o", str(again), "--workers", "1"]) == 0

@@ -45,20 +45,20 @@ def complaint(capsys, *arguments):
 
 
 def test_with_lens_and_pose_the_whole_detector_is_scored(boxes, tmp_path):
-    done = run("--boxes", boxes, "ball", "ball-small", "-o", tmp_path / "out", "--workers", 1)
+    done = run("--boxes", boxes, "ball", "soccer", "-o", tmp_path / "out", "--workers", 1)
     assert "4 of 4 frames" in done.stdout
     assert "the whole detector" in done.stdout
     scores = json.loads((tmp_path / "out" / "scores.json").read_text())
     assert scores["about"]["measured"] == "whole detector"
-    ball, small = scores["networks"]
-    assert (ball["network"], small["network"]) == ("ball", "ball-small")
+    ball, soccer = scores["networks"]
+    assert (ball["network"], soccer["network"]) == ("ball", "soccer")
     count = sum(len(each.read_text().split("\n")) - 1 for each in boxes.glob("image*.txt"))
     everything = ball["scores"]["all"]
     assert everything == {"boxes": count, "found": count, "false": 0, "recall": 1.0, "average_precision": 1.0}
     assert sum(each["boxes"] for size, each in ball["scores"].items() if size != "all") == count
     page = (tmp_path / "out" / "report.html").read_text()
     assert "the whole detector" in page
-    assert "ball-small" in page
+    assert "ball" in page
 
 
 def test_an_object_radius_changes_what_the_detector_finds(boxes, tmp_path):
@@ -75,7 +75,7 @@ def test_an_object_radius_changes_what_the_detector_finds(boxes, tmp_path):
 
 
 def test_without_lens_the_close_look_is_scored(without_lenses, tmp_path):
-    done = run("--boxes", without_lenses, "ball-small", "-o", tmp_path / "out", "--workers", 1)
+    done = run("--boxes", without_lenses, "ball", "-o", tmp_path / "out", "--workers", 1)
     assert "the close look alone" in done.stdout
     scores = json.loads((tmp_path / "out" / "scores.json").read_text())
     assert scores["about"]["measured"] == "close look"
@@ -86,7 +86,7 @@ def test_without_lens_the_close_look_is_scored(without_lenses, tmp_path):
 def test_a_frame_without_pose_among_others_is_told(boxes, tmp_path):
     folder = shutil.copytree(boxes, tmp_path / "some")
     min(folder.glob("lens*")).unlink()
-    done = run("--boxes", folder, "ball-small", "--workers", 1)
+    done = run("--boxes", folder, "ball", "--workers", 1)
     assert "the close look alone" in done.stdout
     assert "Only 3 of the 4 frames have a lens file" in done.stderr
 
@@ -114,7 +114,7 @@ def test_mistakes_are_told_in_one_line(boxes, without_lenses, tmp_path, capsys):
     (tmp_path / "report.html").write_text("mine")
     assert "which no evaluation wrote" in complaint(capsys, "--boxes", boxes, "ball", "-o", tmp_path)
     bare = tmp_path / "bare.onnx"
-    run_program("vm-export", "ball-small", "--no-look", "-o", bare)
+    run_program("vm-export", "ball", "--no-look", "-o", bare)
     assert "has no close look" in complaint(capsys, "--boxes", without_lenses, bare, "--workers", 1)
     assert main(["--boxes", str(boxes), str(bare), "--workers", "1"]) == 0  # with lens and pose, it needs none
 
@@ -122,8 +122,8 @@ def test_mistakes_are_told_in_one_line(boxes, without_lenses, tmp_path, capsys):
 def test_networks_may_follow_new_names(without_lenses):
     """Although --names takes all that follows."""
     (without_lenses / "classes.txt").unlink()
-    done = run("--boxes", without_lenses, "--workers", 1, "--names", "0=ball", "ball-small")
-    assert "ball-small" in done.stdout
+    done = run("--boxes", without_lenses, "--workers", 1, "--names", "0=ball", "ball")
+    assert "ball" in done.stdout
 
 
 def test_its_help_needs_no_folder():

@@ -13,7 +13,7 @@ from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_export.change_model import change_looks
-from vm_export.look_weights import look_of
+from vm_export.look_weights import looks_of
 from vm_train.cli.evaluate import main
 from vm_train.scores.calibration import Calibration, logits_from
 
@@ -34,19 +34,23 @@ def calibrate(*arguments):
 
 @pytest.mark.long
 def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp_path, capsys):
-    shipped = model_path("ball-small")
-    change_looks(shipped, tmp_path / "unsure.onnx", [look_of(read_model(shipped)).recalibrated(0.6, 0.3, "no picture")])
+    shipped = model_path("ball")
+    change_looks(
+        shipped,
+        tmp_path / "unsure.onnx",
+        [each.recalibrated(0.6, 0.3, "no picture") for each in looks_of(read_model(shipped))],
+    )
     assert calibrate(tmp_path / "unsure.onnx", data, "-o", tmp_path / "once.onnx") == 0
     _, before, after, scale = map(float, FITTED.search(capsys.readouterr().out).groups())
     assert after < before
     old, new = (read_model(tmp_path / f"{name}.onnx") for name in ("unsure", "once"))
-    patches = random_patches(20, old.manifest.look.size)
-    first, second = (CloseLook.of(each).run(patches) for each in (old, new))
+    patches = random_patches(20, old.manifest.looks[0].size)
+    first, second = (CloseLook.of(each)["ball"].run(patches) for each in (old, new))
     np.testing.assert_allclose(second[:, 1:], first[:, 1:], atol=1e-6)
     logits = [logits_from(each[:, 0].astype(np.float64)) for each in (first, second)]
     offset = logits[1][0] - scale * logits[0][0]
     np.testing.assert_allclose(logits[1], scale * logits[0] + offset, atol=0.05)  # the printed scale has two digits
-    assert re.fullmatch(r"\d+ answers in 60 pictures", new.manifest.look.provenance["calibrated_on"])
+    assert re.fullmatch(r"\d+ answers in 60 pictures", new.manifest.looks[0].provenance["calibrated_on"])
 
     assert calibrate(tmp_path / "once.onnx", data, "-o", tmp_path / "twice.onnx") == 0
     again = float(FITTED.search(capsys.readouterr().out)[4])
@@ -56,7 +60,7 @@ def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp
 @pytest.mark.long
 def test_objects_of_another_size_and_a_calibration_that_does_not_help_are_told(data, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(Calibration, "fit", lambda logits, right: Calibration(1.0, 0.0))
-    assert main(["calibrate", "ball-small", str(data), "-o", str(tmp_path / "own.onnx")]) == 0
+    assert main(["calibrate", "ball", str(data), "-o", str(tmp_path / "own.onnx")]) == 0
     said = capsys.readouterr().err
     assert "have a radius of 0.070 m, but the detector expects 0.095 m. --radius-of scene" in said
     assert "class ball: the error is not smaller than before: give more pictures" in said
@@ -75,19 +79,19 @@ def test_a_canary_that_is_not_found_any_more_is_a_warning(data, tmp_path, capsys
         number = path.stem.removeprefix("mask")
         for each in (tmp_path / "data").glob(f"*{number}.*"):
             shutil.copy(each, each.with_name(each.name.replace(number, f"1{number}")))
-    assert calibrate("ball-small", tmp_path / "data", "-o", tmp_path / "unsure.onnx") == 0
+    assert calibrate("ball", tmp_path / "data", "-o", tmp_path / "unsure.onnx") == 0
     assert "unsure.onnx has no canary, because its networks do not find every class" in capsys.readouterr().err
     assert read_model(tmp_path / "unsure.onnx").canary is None
 
 
 def test_what_can_not_be_calibrated_is_one_line(data, tmp_path, capsys):
     for arguments, said in (
-        ((MODEL, data, "-o", tmp_path / "a.onnx"), "has no close look; vm-export --look attaches one"),
+        ((MODEL, data, "-o", tmp_path / "a.onnx"), "has no peaks: only their confidence"),
         (("bal", data, "-o", tmp_path / "a.onnx"), "unknown network 'bal'; did you mean 'ball'?"),
         ((MODEL, data, "-o", MODEL), "is an input and would be overwritten"),
-        (("ball-small", data, "-o", "/nowhere/a.onnx"), "/nowhere"),
-        (("ball-small", data, "-o", tmp_path / "a.pt"), "a.pt must end in .onnx"),
-        (("ball-small", draw_set(tmp_path / "few", 2), "-o", tmp_path / "a.onnx"), "which needs 10 of each"),
+        (("ball", data, "-o", "/nowhere/a.onnx"), "/nowhere"),
+        (("ball", data, "-o", tmp_path / "a.pt"), "a.pt must end in .onnx"),
+        (("ball", draw_set(tmp_path / "few", 2), "-o", tmp_path / "a.onnx"), "which needs 10 of each"),
     ):
         assert calibrate(*arguments) == 1
         (line,) = capsys.readouterr().err.splitlines()

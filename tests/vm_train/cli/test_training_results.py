@@ -69,7 +69,7 @@ def test_a_hexagonal_network_trains_and_is_not_exported(data, configuration, tmp
 
 @pytest.mark.long
 def test_a_small_network_learns_to_find_the_balls_of_pictures_it_has_not_seen(configuration, tmp_path):
-    """Five layers of four channels; docs/training.md has the whole of it."""
+    """Five layers of four channels, as in benchmarks/experiments/training.md."""
     data = draw_set(tmp_path / "data", 160, seed=4, size=(320, 256))
     settings = ["mesh.max_distance=5", "network.depth=5", "training.selection=balanced", "training.epochs=25"]
     settings += ["training.rate=0.02", "data.test=0.25"]

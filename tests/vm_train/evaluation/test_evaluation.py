@@ -45,12 +45,9 @@ def files(drawn):
 
 @pytest.fixture(scope="module")
 def models(tmp_path_factory):
-    """The drawn frames' network as a checkpoint and as a model file of each layout."""
-    folder = tmp_path_factory.mktemp("models")
-    paths = {"pt": CHECKPOINT}
-    for layout in ("plain", "runs"):
-        paths[layout] = folder / f"{layout}.onnx"
-        export(Checkpoint.load(CHECKPOINT), paths[layout], layout)
+    """The drawn frames' network as a checkpoint and as a model file."""
+    paths = {"pt": CHECKPOINT, "onnx": tmp_path_factory.mktemp("models") / "model.onnx"}
+    export(Checkpoint.load(CHECKPOINT), paths["onnx"])
     return {name: load_subject(path, SETTINGS) for name, path in paths.items()}
 
 
@@ -90,10 +87,10 @@ def test_scores_of_checkpoints_and_model_files_agree(models, files):
 
 
 def test_the_drawn_balls_are_found_where_they_are(models):
-    result = Evaluation.empty(models["runs"])
+    result = Evaluation.empty(models["onnx"])
     files = find_pictures(FOLDER)
     for each, (picture, scene) in zip(files, drawn_pictures(), strict=True):
-        result.count(each, picture, scene, models["runs"].answer(picture), MANIFEST)
+        result.count(each, picture, scene, models["onnx"].answer(picture), MANIFEST)
     ranking = result.objects["ball"].ranking(0.5)
     assert ranking.at().hits == 6
     assert ranking.errors().distance_median < 0.06
@@ -114,10 +111,10 @@ def test_a_robot_finds_the_same_balls_with_its_shared_meshes(models):
 class ByColor:
     """A network that knows how pictures are drawn: orange balls, green fields, white lines."""
 
-    def run(self, layout, colors, on_screen):
+    def run(self, layout, colors, on_screen, points):
         red, green, blue = colors
         answers = np.select([red > 1.4 * blue, green > 1.4 * red, red + green + blue > 1.6], [0, 2, 1], 3)
-        return np.eye(4, dtype=np.float32)[answers]
+        return np.eye(4, dtype=np.float32)[answers[points]]
 
 
 class Always:
@@ -126,8 +123,8 @@ class Always:
     def __init__(self, answer):
         self.answer = np.float32(answer)
 
-    def run(self, layout, colors, on_screen):
-        return np.tile(self.answer, (len(layout), 1))
+    def run(self, layout, colors, on_screen, points):
+        return np.tile(self.answer, (len(points), 1))
 
 
 KNOWING = ExactSubject(MANIFEST, Grid(), "", SETTINGS, ByColor())

@@ -39,15 +39,14 @@ ABOUT = {
 class Reporting:
     """A network that reports the same features for every picture."""
 
-    look = None
     sha256 = ""
 
     def __init__(self, reported, manifest=MANIFEST, grid="visual"):
-        self.reported, self.manifest, self.grid = reported, manifest, Grid(grid)
+        self.reported, self.manifest, self.grid, self.looks = reported, manifest, Grid(grid), {}
 
     def answer(self, picture, radius=None):
         none = np.zeros((0, len(self.manifest.classes)), dtype=np.float32)
-        return PictureAnswer(np.zeros((0, 2)), np.zeros(0), none, (), {}, {}, self.manifest, self.reported)
+        return PictureAnswer(np.zeros((0, 2)), np.zeros(0), none, (), {}, self.manifest, self.reported)
 
 
 REPORTING = Reporting(features(posts=[(5.0, 2.0)], robots=[(2.5, 1.6), (4.0, 0.9)]))
@@ -74,13 +73,13 @@ def test_field_features_have_scores(result):
 
 
 def test_confidences_of_posts_and_robots_reach_their_scores(result):
-    confidences, right = result.features.posts.judged()
-    assert (confidences.tolist(), right.tolist()) == (
+    posts = result.features.posts.ranking()
+    assert (posts.confidence.tolist(), posts.right.tolist()) == (
         [each.confidence for each in REPORTING.reported.posts] * 3,
         [True] * 3,
     )
-    confidences, _ = result.features.robots.judged()  # of the two, one is a person
-    assert confidences.tolist() == [REPORTING.reported.robots[0].confidence] * 3
+    robots = result.features.robots.ranking()  # of the two, one is a person
+    assert robots.confidence.tolist() == [REPORTING.reported.robots[0].confidence] * 3
 
 
 def test_parts_add_up(files, result):

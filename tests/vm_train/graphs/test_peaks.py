@@ -29,7 +29,6 @@ MANIFEST = ball_manifest(
     *("ball", "goal:upright", "line", "field", "robot:upright", "environment"),
     intersections=3.0,
     mesh="octaves",
-    layout="canvas",
     max_distance=14.0,
     peaks=("ball", "robot"),
 )
@@ -128,7 +127,7 @@ def test_a_scene_tells_the_places_and_a_mask_those_of_balls_only(tmp_path):
 
 @pytest.mark.parametrize(("known", "shown"), [("ball", []), ("goal:upright", [1, 1, 0]), ("robot:upright", [1, 0])])
 def test_a_network_of_few_classes_learns_the_places_of_these(tmp_path, known, shown):
-    manifest = ball_manifest(known, "rest", mesh="octaves", layout="canvas", peaks=(known.partition(":")[0],))
+    manifest = ball_manifest(known, "rest", mesh="octaves", peaks=(known.partition(":")[0],))
     labels = np.array([each not in known for each in CLASSES], np.int8)[picture().labels]
     scene = write_scene(tmp_path / "scene1.json", scene_table() | {"ball_radius": 0.1, "ball": None})
     found = true_places(replace(picture(), labels=labels), scene, manifest)

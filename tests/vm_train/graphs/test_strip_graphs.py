@@ -37,7 +37,7 @@ ARRAYS = ("points", "neighbors", "labels", "distances", "pixels", "cells")
 
 
 def manifest(**changes):
-    entries = {"intersections": 3.0, "mesh": "octaves", "layout": "canvas", "max_distance": 6.0} | changes
+    entries = {"intersections": 3.0, "mesh": "octaves", "max_distance": 6.0} | changes
     return ball_manifest("ball", "other", **entries)
 
 
@@ -114,15 +114,13 @@ def test_the_network_of_a_training_answers_as_on_the_robot(network, colors):
     shown, facts = picture(), manifest(colors=colors)
     graph = graph_of(shown, facts)
     mesh = facts.model.build(facts.mesh_shape, 1.0, facts.intersections, facts.max_distance)
-    seen = project(mesh, shown.orientation.level, shown.fitted_lens, SIZE).visible.graph
-    layout = choose_layout(seen, facts)
-    on_screen = layout.slots < len(seen)
-    point_of = np.full(len(seen) + 1, -1)
-    point_of[np.flatnonzero(np.isin(seen.strips, seen.strips[~seen.margin]))] = np.arange(len(graph))
-    feeds = layout.feeds(graph.points[point_of[layout.slots]].T.copy(), on_screen)
+    seen = project(mesh, shown.orientation.level, shown.fitted_lens, SIZE)
+    seen = seen.only(mesh.needed(seen.on_screen)).visible
+    layout = choose_layout(seen.graph, facts)
+    feeds = layout.feeds(np.stack([layout.spread(each) for each in graph.points[:-1].T]), seen.on_screen)
     with torch.inference_mode():
         logits = network.canvas_logits(*(torch.from_numpy(feeds[name]) for name in ("points", "shown")))
-    found = logits[0].flatten(1).T.softmax(dim=1).numpy()[layout.places]
+    found = layout.read(logits.softmax(dim=1).numpy(), seen.answered)
     np.testing.assert_allclose(found, answers(network, graph)[graph.counted], atol=1e-6)
 
 
@@ -210,18 +208,17 @@ def test_a_window_is_the_part_of_its_points(share, seed):
     np.testing.assert_array_equal(part.cells, whole.cells[kept] if len(part) else np.empty((0, 2)))
     np.testing.assert_array_equal(part.labels, whole.labels[kept] if len(part) else [])
     if len(part):
-        pieces, shape, slot = place_on_canvas(part.cells, part.counted)
-        assert (slot >= 0).all() or not part.counted.all()
-        assert len(np.unique(slot[slot >= 0])) == (slot >= 0).sum()
-        assert slot.max() < shape[0] * shape[1]
-        assert len(pieces) == len(np.unique(part.cells[part.counted, 1] // STRIDE))
+        pieces, shape, places = place_on_canvas(part.cells)
+        assert len(np.unique(places)) == len(part)
+        assert 0 <= places.min() <= places.max() < shape[0] * shape[1]
+        assert len(pieces) == len(np.unique(part.cells[:, 1] // STRIDE))
 
 
 def test_views_that_are_kept_are_those_that_were_made(tmp_path):
     pictures = find_pictures(draw_set(tmp_path / "pictures", 2))
     recipe = GraphRecipe(
         TrainConfiguration().classes.mask_classes(),
-        replace(TrainConfiguration().manifest, mesh="octaves", layout="canvas", max_distance=4.0, colors="relative"),
+        replace(TrainConfiguration().manifest, mesh="octaves", max_distance=4.0, colors="relative"),
         augmentation=Augmentation(brightness=0.0, contrast=0.0, saturation=0.0, hue=0.0, gamma=0.0, noise=0.0),
     )
 

@@ -85,7 +85,7 @@ def test_octaves_have_a_network_and_a_layout_of_their_own(write):
     found = read_sections(TrainConfiguration, write("[mesh]\nmodel = 'octaves'\n[network]\ndepth = 2\nwidth = 24\n"))
     assert found.network_shape == CanvasShape(2, 24, len(found.classes.colors), peaks=3)
     assert found.manifest.peaks == ("ball", "goal", "robot")
-    assert (found.manifest.mesh, found.manifest.layout) == ("octaves", "canvas")
+    assert found.manifest.on_canvas
     assert read_sections(TrainConfiguration, write(to_commented_toml(found))) == found
 
 

@@ -36,7 +36,7 @@ def first(data, configuration, tmp_path_factory):
 
 @pytest.mark.long
 def test_with_a_tiny_rate_the_network_stays_the_same_from_a_checkpoint_and_from_its_model_file(first, data, tmp_path):
-    export(Checkpoint.load(first), tmp_path / "model.onnx", "runs")
+    export(Checkpoint.load(first), tmp_path / "model.onnx")
     tables = tmp_path / "classes.toml"
     tables.write_text(CLASSES)  # the mesh and the layers come from the network
     for start in (first, tmp_path / "model.onnx"):

@@ -22,7 +22,7 @@ RECIPES = {
     "muon": Recipe(epochs=3, batch=2, optimizer="muon", rate=0.02),
     "adamw": Recipe(epochs=3, batch=3),
 }
-NOTHING = empty_graph(ball_manifest(mesh="octaves", layout="canvas"))
+NOTHING = empty_graph(ball_manifest(mesh="octaves"))
 
 
 def graph(position, rows=13, columns=30):

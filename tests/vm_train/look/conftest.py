@@ -9,7 +9,7 @@ TINY = """
 validation = 0.25
 [patches]
 size = 16
-proposals = 10
+max_proposals = 10
 jittered = 2
 random = 2
 [network]

@@ -1,10 +1,9 @@
 """Patches are the same whoever collects them, and whatever interrupts it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from tests.other_model import OTHER
 from vm_embedded.config.sections import read_sections
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
@@ -30,8 +29,8 @@ def begin(drawn, tiny, tmp_path):
     def begin_one(name="run", data=drawn, strict=False, changes=None):
         split = split_by_seed([each.number for each in find_pictures(data)], 0.25, 0.0, 0)
         configuration = read_sections(LookConfiguration, tiny, changes)
-        model = model_path("ball-small")
-        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball-small", strict=strict)
+        model = model_path("ball")
+        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball", strict=strict)
 
     return begin_one
 
@@ -143,7 +142,7 @@ def test_files_that_were_changed_since_the_beginning_are_refused(begin):
     run = begin()
     assert kind_of(run.folder) == "look"
     mesh, toml = run.mesh.read_bytes(), (run.folder / "look.toml").read_text()
-    run.mesh.write_bytes(Path(model_path("ball")).read_bytes())
+    run.mesh.write_bytes(OTHER.read_bytes())
     with pytest.raises(InputError, match=r"mesh\.onnx was changed"):
         read_look_run(run.folder)
     run.mesh.write_bytes(mesh)

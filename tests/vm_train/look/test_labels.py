@@ -64,9 +64,9 @@ def test_a_place_near_a_ball_shows_it_and_the_targets_lead_to_its_center_and_siz
 @given(pixels, angles)
 def test_places_show_a_ball_or_none_or_are_left_out_by_their_distance(pixel, angle):
     truths = ball(pixel)
-    assert label(truths, 0.4, angle) == OBJECT
-    assert label(truths, 0.8, angle) in (UNLABELED, NOTHING if angle > np.pi else UNLABELED)
-    assert label(truths, 1.4, angle) == NOTHING
+    assert label(truths, 0.6, angle) == OBJECT
+    assert label(truths, 1.1, angle) in (UNLABELED, NOTHING if angle > np.pi else UNLABELED)
+    assert label(truths, 1.7, angle) == NOTHING
 
 
 @given(pixels, st.sampled_from([(1.0, OBJECT), (1.25, OBJECT), (1.45, UNLABELED), (1.9, NOTHING)]), st.booleans())
@@ -78,7 +78,7 @@ def test_balls_of_another_size_are_not_the_object(pixel, case, is_small):
 @given(pixels, st.floats(0.0, 0.24))
 def test_near_a_hidden_ball_nothing_is_labeled(pixel, visible):
     assert label(ball(pixel, visible=visible), 0.3) == UNLABELED
-    assert label(ball(pixel, visible=visible), 1.5) == NOTHING
+    assert label(ball(pixel, visible=visible), 1.8) == NOTHING
 
 
 def test_the_nearest_of_two_balls_counts():
@@ -104,7 +104,7 @@ def test_truth_from_a_mask_is_near_that_of_the_scene(drawn, tmp_path):
     """The mask's ball is smaller where the picture ends."""
     (tmp_path / "look.toml").write_text(CLASSES)
     table = read_sections(LookConfiguration, tmp_path / "look.toml").classes
-    subject = load_subject(model_path("ball-small"), Settings())
+    subject = load_subject(model_path("ball"), Settings())
     compared = 0
     for files in find_pictures(drawn):
         picture, scene = read_picture(files, table.mask_classes()), read_scene(drawn / f"scene{files.number}.json")

@@ -4,21 +4,16 @@ import json
 import re
 import shutil
 import signal
-from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from tests.drawn_scenes import CHECKPOINT
 from tests.vm_train.commands import run, run_and_stop, run_module
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
-from vm_export.checkpoint import Checkpoint
 from vm_export.eight_bits import rounded
-from vm_export.grid import Grid
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.cli.train import main
 from vm_train.data.pictures import find_pictures
@@ -32,7 +27,7 @@ def look(drawn, tiny):
     """Runs vm-train look on the drawn pictures with one worker; more arguments override these."""
 
     def run_look(output, *arguments, **options):
-        given = ["--from", "ball-small", "--config", tiny, "--workers", 1, *arguments]
+        given = ["--from", "ball", "--config", tiny, "--workers", 1, *arguments]
         return run("look", drawn, "-o", output, *given, **options)
 
     return run_look
@@ -58,9 +53,7 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
         assert re.fullmatch(rf"epoch {number} of 4: {learned}", line), line
     assert "look.pt: in " in lines[9]
     output = folder / "model.onnx"
-    behind = f"--from {folder / 'mesh.onnx'} --glance {folder / 'look.pt'} -o {folder}-look"
-    assert lines[10] == f"next, to use it as a glance: vm-train look {drawn} {behind}"
-    assert lines[11] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
+    assert lines[10] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
     assert {path.name for path in folder.iterdir()} == {
         *("look.toml", "pictures.json", "run.json", "mesh.onnx", "patches", "state.pt", "log.jsonl", "tensorboard"),
         *("look.pt", "result.json"),
@@ -68,7 +61,7 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     records = [record for _, record in read_log(folder / "log.jsonl")]
     steps = [each["step"] for each in records if "loss" in each]
     assert steps == list(range(1, len(steps) + 1))
-    assert [(each["round"], each["epoch"]) for each in records if "epoch" in each] == [(1, 1), (1, 2), (2, 3), (2, 4)]
+    assert [(each["round"], each["epoch"]) for each in records if "epoch" in each] == [(1, 1), (1, 2), (1, 3), (1, 4)]
     result = json.loads((folder / "result.json").read_text())
     assert sum(each["count"] for each in result["bins"]) > 0
 
@@ -90,7 +83,7 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     made = LookCheckpoint.load(folder / "look.pt")
     contract = made.contract
     assert (contract.object_class, contract.size, contract.channels) == ("ball", 16, (4, 6, 8))
-    assert (contract.extent, contract.above, contract.passes) == (1.75, 0.003, 3)
+    assert (contract.extent, contract.max_proposals) == (1.75, 10)
     assert made.examples.shape == (4, 16, 16, 3)
     assert contract.provenance["data"] == drawn.name
     assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["made_from"]["mesh.onnx"]
@@ -107,29 +100,10 @@ def test_the_next_command_attaches_it_to_its_mesh_network(whole):
     folder, done = whole
     _, *arguments = done.stdout.splitlines()[-1].removeprefix("next: ").split()
     run_module("vm_export.cli", *arguments)
-    found = read_model(folder / "model.onnx").manifest.look
-    assert found is not None
+    (found,) = read_model(folder / "model.onnx").manifest.looks
     assert LookCheckpoint.load(folder / "look.pt").contract.provenance.items() <= found.provenance.items()
     assert found.self_test is not None
     (folder / "model.onnx").unlink()
-
-
-@pytest.mark.long
-def test_a_look_learns_from_what_its_glance_passes_on(whole, look, tmp_path):
-    glance = whole[0] / "look.pt"
-    folder = tmp_path / "run"
-    lines = look(folder, "--glance", glance).stdout.splitlines()
-    assert re.fullmatch(r"the glance passes on \d+ of \d+ visible objects \(\d+ %\)", lines[3])
-    fewer, all_proposals = (int(re.search(r"validation: (\d+)", each)[1]) for each in (lines[2], whole[1].stdout))
-    assert fewer < all_proposals
-    made = LookCheckpoint.load(folder / "look.pt")
-    assert made.contract.glance == LookCheckpoint.load(glance).contract
-    copy, given = (LookCheckpoint.load(each).network.state_dict() for each in (folder / "glance.pt", glance))
-    assert all(torch.equal(copy[name], weights) for name, weights in given.items())
-    run_module("vm_export.cli", *lines[-1].removeprefix("next: vm-export ").split())
-    assert CloseLook.of(read_model(folder / "model.onnx")).glance is not None
-    (folder / "glance.pt").write_bytes(b"other")
-    assert "glance.pt was changed since" in run("resume", folder, code=1).stderr
 
 
 @pytest.mark.long
@@ -157,7 +131,7 @@ def assert_same(folder, expected):
 def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, steps, whole, drawn, tiny, tmp_path):
     """0 steps: while patches are collected, by two workers."""
     folder = tmp_path / "run"
-    arguments = ["look", drawn, "--from", "ball-small", "--config", tiny, "--workers", 1 if steps else 2]
+    arguments = ["look", drawn, "--from", "ball", "--config", tiny, "--workers", 1 if steps else 2]
     run_and_stop(how, folder, "log.jsonl" if steps else "run.json", steps, *arguments)
     run("resume", folder, "--workers", 1)
     assert_same(folder, whole[0])
@@ -194,7 +168,7 @@ def complaint(drawn, tiny, tmp_path, capsys):
     """What vm-train look says about arguments that it can't use: one line."""
 
     def complain(*arguments):
-        given = ["look", drawn, "-o", tmp_path / "run", "--from", "ball-small", "--config", tiny, *arguments]
+        given = ["look", drawn, "-o", tmp_path / "run", "--from", "ball", "--config", tiny, *arguments]
         assert main([str(each) for each in given]) == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith("vm-train: ")
@@ -206,12 +180,12 @@ def complaint(drawn, tiny, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--from", "ball-smaller"], "unknown network 'ball-smaller'; did you mean 'ball-small'?"),
+        (["--from", "baller"], "unknown network 'baller'; did you mean 'ball'?"),
         (["--from", "none.onnx"], "none.onnx"),
         (["--from", "none.txt"], "a model must be a checkpoint (.pt) or a model file (.onnx)"),
-        (["--from", str(CHECKPOINT), "--set", "patches.object_class=goal"], "unknown object of"),
+        (["--from", str(CHECKPOINT)], "a close look judges peaks, and this network has none"),
         (["--set", "patches.size=1000"], "[patches] size must be a whole number from 8 to 128 px, not 1000"),
-        (["--set", "patches.object_class=goal"], "unknown object of ball-small 'goal'; did you mean 'ball'?"),
+        (["--set", "patches.object_class=goal"], "unknown class with peaks of ball 'goal'; did you mean 'ball'?"),
         (["--set", "data.validation=0"], "validation gets none of the 20 pictures"),
         (["--set", "classes=1"], "--set 'classes=1' must have the form SECTION.ENTRY=VALUE"),
         (["--config", "none.toml"], "can't read configuration none.toml"),
@@ -227,11 +201,6 @@ def test_a_class_that_the_masks_do_not_have_ends_in_one_line(complaint, tmp_path
     assert "has class 'ball', but those of the kind object in [classes] are puck" in complaint("--config", path)
 
 
-def test_a_network_on_another_grid_ends_in_one_line(complaint, tmp_path):
-    replace(Checkpoint.load(CHECKPOINT), grid=Grid("hexagonal", 2.5)).save(tmp_path / "model.pt")
-    assert "needs a network on the Visual Mesh, not on a hexagonal grid" in complaint("--from", tmp_path / "model.pt")
-
-
 def test_files_of_others_are_not_written_over(complaint, tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "look.toml").write_text("# mine")
@@ -243,23 +212,6 @@ def test_a_loss_that_is_no_number_ends_the_training(look, tmp_path):
     done = look(tmp_path / "run", "--set", "training.rate=1000", "--set", "training.epochs=60", code=1)
     assert "begin again with a lower training.rate" in done.stderr
     assert len(done.stderr.splitlines()) == 1
-
-
-@pytest.mark.long
-def test_behind_a_look_with_a_glance_a_wide_look_is_trained(whole, look, tmp_path):
-    before = LookCheckpoint.load(whole[0] / "look.pt")
-    before = replace(before, contract=replace(before.contract, glance=before.contract), glance=before)
-    before.save(tmp_path / "two.pt")
-    folder = tmp_path / "run"
-    look(folder, "--glance", tmp_path / "two.pt", "--set", "patches.extent=4", "--set", "patches.passes=1")
-    made = LookCheckpoint.load(folder / "look.pt")
-    assert [each.extent for each in made.contract.chain] == [4.0, before.contract.extent, before.contract.extent]
-    # The calibration of the mean of both answers is applied to both.
-    (scale, offset), (first, less) = (each.network.calibration.tolist() for each in (made, before))
-    assert made.glance.network.calibration.tolist() == pytest.approx([scale * first, scale * less + offset], rel=1e-4)
-    assert made.glance.glance.contract == before.glance.contract
-    run_module("vm_export.cli", "ball-small", "--look", folder / "look.pt", "-o", folder / "model.onnx")
-    assert read_model(folder / "model.onnx").manifest.look.is_wide
 
 
 def test_a_missing_gpu_is_named_before_anything_is_written(whole, look, tmp_path):
@@ -274,7 +226,7 @@ def test_pictures_without_the_object_end_in_one_line(drawn, tiny, tmp_path):
     folder = draw_set(tmp_path / "data", 12, seed=3)
     for path in folder.glob("scene*.json"):
         path.write_text(json.dumps(json.loads(path.read_text()) | {"ball": None}))
-    arguments = ["--from", "ball-small", "--config", tiny, "--workers", 1]
+    arguments = ["--from", "ball", "--config", tiny, "--workers", 1]
     done = run("look", folder, "-o", tmp_path / "run", *arguments, code=1)
     assert re.search(r"none of the \d+ patches for training show the object ball", done.stderr)
     assert "give more pictures if they are few" in done.stderr

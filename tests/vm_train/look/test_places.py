@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.vm_embedded.detection import test_looking
 from tests.vm_embedded.detection.views import BALL, center_at, observation_of, view_at
 from vm_embedded.detection.patches import Tangents
 from vm_train.look.configuration import PatchSettings
 from vm_train.look.labels import Truths, label_places
-from vm_train.look.places import Places, jittered_places, proposed_places, random_places
+from vm_train.look.places import PatchPlaces, jittered_places, proposed_places, random_places
 
 VIEW = view_at()
 NEAR, FAR = center_at(VIEW, (320.0, 330.0)), center_at(VIEW, (200.0, 230.0))
@@ -52,15 +53,15 @@ def test_random_places_are_in_the_picture_and_on_the_mesh(seed):
 
 
 def test_proposals_are_at_the_balls():
-    observation = observation_of(VIEW, NEAR, FAR)
-    found = proposed_places(observation, "ball", observation.slot_probabilities[:, 0], PatchSettings(), None, 0.0)
-    labels = label_places(found.tangents(VIEW), truths(NEAR, FAR))
+    observation = test_looking.observed(NEAR, FAR)
+    found = proposed_places(observation.view, observation.peaks["ball"], PatchSettings())
+    labels = label_places(found.tangents(test_looking.VIEW), truths(NEAR, FAR))
     assert set(labels.of) >= {0, 1}
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
 def test_a_patch_that_is_cut_larger_shows_a_smaller_ball_and_its_target_says_so(factor):
-    places = Places(NEAR[None], np.array([factor]))
+    places = PatchPlaces(NEAR[None], np.array([factor]))
     patch = places.cut(observation_of(VIEW, NEAR), PatchSettings(size=64, extent=2.0))[0, :, :, 0]
     radius = np.sqrt((patch > 127).sum() / np.pi) / 64 * 4.0  # in expected radii
     assert radius == pytest.approx(1.0 / factor, rel=0.02)
@@ -72,7 +73,7 @@ def test_a_patch_that_is_cut_larger_shows_a_smaller_ball_and_its_target_says_so(
 @given(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4), st.floats(0.85, 1.15))
 def test_the_ball_in_a_patch_is_where_its_targets_say(right, down, factor):
     ray = Tangents.at(VIEW, NEAR[None]).rays(np.array([right]), np.array([down]))
-    places = Places(BALL.center_along(ray, VIEW.height), np.array([factor]))
+    places = PatchPlaces(BALL.center_along(ray, VIEW.height), np.array([factor]))
     patch = places.cut(observation_of(VIEW, NEAR), PatchSettings(size=48, extent=2.0))[0, :, :, 0].astype(float)
     target = label_places(places.tangents(VIEW), truths(NEAR)).targets[0]
     at = (np.arange(48) + 0.5) / 48 * 4.0 - 2.0
@@ -81,5 +82,5 @@ def test_the_ball_in_a_patch_is_where_its_targets_say(right, down, factor):
 
 
 def test_places_of_no_proposals_can_be_cut():
-    places = Places.of(np.empty((0, 3)))
+    places = PatchPlaces.of(np.empty((0, 3)))
     assert places.cut(observation_of(VIEW), PatchSettings(size=16)).shape == (0, 16, 16, 3)

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_train.look.judging import Found, shown_before
 from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchSet
-from vm_train.look.scores import LookResult, LookScore, average_precision
+from vm_train.look.scores import LookScore, result_in_words, result_values
+from vm_train.look.validation import shown_before
 from vm_train.scores.calibration import BINS, Calibration, Reliability
+from vm_train.scores.object_ranking import Ranking
 
 flags = st.lists(st.booleans(), min_size=1, max_size=40)
 
@@ -52,23 +53,6 @@ def test_answers_without_a_mistake_do_not_get_an_infinite_scale():
     assert 0.5 < found.scale < 5.0
 
 
-@given(flags, st.integers(0, 2**32))
-def test_the_average_precision_is_that_of_a_ranking(right, seed):
-    right = np.array(right)
-    confidence = np.random.default_rng(seed).permutation(len(right)).astype(float)
-    ranked = right[np.argsort(-confidence)]
-    precision = np.cumsum(ranked) / np.arange(1, len(right) + 1)
-    highest = np.maximum.accumulate(precision[::-1])[::-1]
-    expected = highest[ranked].mean() if right.any() else math.nan
-    assert average_precision(confidence, right) == pytest.approx(expected, nan_ok=True)
-    if right.any():
-        assert average_precision(confidence, right, 2 * int(right.sum())) == pytest.approx(expected / 2)
-
-
-def test_equal_answers_count_together():
-    assert average_precision(np.zeros(4), np.array([True, False, False, False])) == 0.25
-
-
 def test_errors_are_medians_over_patches_with_an_object():
     patches = PatchSet.empty(16, 4)
     patches.labels[:] = [OBJECT, OBJECT, OBJECT, NOTHING]
@@ -82,15 +66,15 @@ def test_errors_are_medians_over_patches_with_an_object():
 
 
 def test_the_result_counts_what_is_reported_and_what_is_missed():
-    found = Found(np.array([4.0, 3.0, 2.0, -4.0]), np.array([True, False, True, False]), objects=4, pictures=3)
-    made = LookResult.of(found, Calibration())
-    assert (made.hits, made.false, made.average_precision) == pytest.approx((2, 1, (1.0 + 2 / 3) / 4))
-    assert "finds 2 of 4 visible objects" in str(made)
-    assert len(made.as_dict()["bins"]) == BINS
-    empty = {"from": 0.4667, "to": 0.5333, "count": 0, "confidence": None, "right": None}
-    assert made.as_dict()["bins"][7] == empty
-    nothing = LookResult.of(Found.joined([]), Calibration())
-    assert nothing.as_dict()["average_precision"] is None
+    logits, right = np.array([4.0, 3.0, 2.0, -4.0]), np.array([True, False, True, False])
+    found = Ranking(confidence=Calibration().probabilities(logits), right=right, truths=4, pictures=3)
+    values = result_values(found, Calibration())
+    assert values["at_probability_0.5"] == {"hits": 2, "false": 1}
+    assert values["average_precision"] == pytest.approx((1.0 + 2 / 3) / 4)
+    assert "finds 2 of 4 visible objects" in result_in_words(found)
+    assert len(values["bins"]) == BINS
+    assert values["bins"][7] == {"from": 0.4667, "to": 0.5333, "count": 0, "confidence": None, "right": None}
+    assert result_values(Ranking.empty(), Calibration())["average_precision"] is None
 
 
 @given(st.lists(st.integers(-1, 4), max_size=12))

@@ -33,7 +33,7 @@ class LineTraining(Training):
         super().__init__()
         folder.mkdir(exist_ok=True)
         self.run = LineRun(folder, {}, 1)
-        self.rounds, self.epochs, self.steps, self.patience = ROUNDS, range(EPOCHS), STEPS, patience
+        self.rounds, self.epochs, self.steps, self.patience = ROUNDS, EPOCHS, STEPS, patience
         self._scores, self._bad = scores, bad
 
     def begin(self, progress, stopped):

@@ -59,9 +59,10 @@ def test_confidences_are_judged_by_the_reports_that_are_found_or_false():
     found = at((4.0, 0.1), (7.0, 3.0), (2.15, -1.0), (5.0, -2.0))
     scores.add([post(4.0), post(2.0, -1.0)], found, [post(5.0, -2.0)], [0.9, 0.2, 0.6, 0.7])
     scores.add([post(3.0)], at((3.0, 0.0)), (), [0.5])
-    confidences, right = scores.judged()
-    assert confidences.tolist() == [0.9, 0.2, 0.5]
-    assert right.tolist() == [True, False, True]
+    ranking = scores.ranking()
+    assert ranking.confidence.tolist() == [0.9, 0.2, 0.5]
+    assert ranking.right.tolist() == [True, False, True]
+    assert (ranking.truths, ranking.pictures) == (3, 2)
 
 
 def test_a_second_report_of_the_same_post_is_false():

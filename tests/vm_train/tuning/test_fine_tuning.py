@@ -12,7 +12,7 @@ from tests.vm_train.commands import run, run_and_stop
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
-from vm_export.look_weights import look_of
+from vm_export.look_weights import looks_of
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.train import main
 from vm_train.runs.log import read_log
@@ -26,7 +26,7 @@ def tune(frames, tiny):
     """Runs vm-train tune with one worker; more arguments override these."""
 
     def run_tuning(output, *arguments, boxes=frames, **options):
-        given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", 1, *arguments]
+        given = ["--from", "ball", "--names", "0=ball", "--config", tiny, "--workers", 1, *arguments]
         return run("tune", boxes, "-o", output, *given, **options)
 
     return run_tuning
@@ -43,29 +43,28 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
     folder, done = whole
     lines = done.stdout.splitlines()
     assert lines[0] == f"{frames}: 12 frames of 3 recordings: 4 for training, 4 for validation, 4 for the test"
-    for start, stage in ((1, "glance"), (4, "look")):
-        assert re.fullmatch(rf"{stage}: \d+ patches of your frames, \d+ of them show the object", lines[start])
-        for epoch in (1, 2):
-            assert re.fullmatch(
-                rf"{stage}, epoch {epoch} of 2: validation loss [\d.]+ for your frames, [\d.]+ for rendered patches"
-                r"( \(the best so far\))?, with \d+0% of the new weights; "
-                r"loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
-                lines[start + epoch],
-            )
+    assert re.fullmatch(r"\d+ patches of your frames, \d+ of them show the object", lines[1])
+    for epoch in (1, 2):
+        assert re.fullmatch(
+            rf"epoch {epoch} of 2: validation loss [\d.]+ for your frames, [\d.]+ for rendered patches"
+            r"( \(the best so far\))?, with \d+0% of the new weights; "
+            r"loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left",
+            lines[1 + epoch],
+        )
     assert re.search(
-        r"model.onnx: in 4 frames for the test, the look alone finds \d+ of \d+ boxes and \d+ false", lines[7]
+        r"model.onnx: in 4 frames for the test, the look alone finds \d+ of \d+ boxes and \d+ false", lines[4]
     )
-    assert lines[9:] == [
+    assert lines[6:] == [
         f"report: {folder / 'report.html'}",
-        f"next: vm-evaluate --boxes {frames} --names 0=ball --list {folder / 'pictures.json'} ball-small "
+        f"next: vm-evaluate --boxes {frames} --names 0=ball --list {folder / 'pictures.json'} ball "
         f"{folder / 'model.onnx'} -o evaluation",
         f"next: vm-detect --model {folder / 'model.onnx'} FRAMES --lens LENS.yaml --height METERS --pitch ANGLE "
         "--save-overlay found",
     ]
     assert "with fewer than 25 frames for training" in done.stderr
     assert {path.name for path in folder.iterdir()} == {
-        *("tune.toml", "run.json", "before.onnx", "rendered.npz", "patches", "glance.pt", "look.pt"),
-        *("log.jsonl", "tensorboard", "state.pt", "model.onnx", "report.html", "result.json", "pictures.json"),
+        *("tune.toml", "run.json", "before.onnx", "rendered.npz", "patches", "look.pt", "log.jsonl", "tensorboard"),
+        *("state.pt", "model.onnx", "report.html", "result.json", "pictures.json"),
     }
     result = json.loads((folder / "result.json").read_text())
     assert result["before"]["all"]["boxes"] == result["after"]["all"]["boxes"] > 0
@@ -80,16 +79,15 @@ def test_it_leaves_a_model_file_a_report_and_what_it_was_made_of(whole, frames):
 
 def test_the_new_model_differs_only_in_its_close_look(whole):
     folder, _ = whole
-    before, after = read_model(model_path("ball-small")), read_model(folder / "model.onnx")
+    before, after = read_model(model_path("ball")), read_model(folder / "model.onnx")
     assert after.manifest.classes == before.manifest.classes
     assert after.manifest.self_test.as_dict() == before.manifest.self_test.as_dict()
-    for new, old in zip(after.look, before.look, strict=True):
-        assert new != old
-    provenance = after.manifest.look.provenance
+    assert after.looks != before.looks
+    provenance = after.manifest.looks[0].provenance
     assert provenance["fine_tuned_frames"] == "4"
     assert provenance["fine_tuned_from_sha256"] == before.sha256
-    assert provenance["data"] == before.manifest.look.provenance["data"]
-    assert CloseLook.of(after).glance is not None  # loads, and passes its self-tests
+    assert provenance["data"] == before.manifest.looks[0].provenance["data"]
+    CloseLook.of(after)  # loads, and passes its self-tests
 
 
 @pytest.mark.long
@@ -101,28 +99,14 @@ def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_b
     (seen / "object.toml").write_text('shape = "sphere"\nradius = 0.11\n')
     done = tune(tmp_path / "run", "--set", "data.validation=0", "--set", "data.test=0", boxes=seen)
     lines = done.stdout.splitlines()
-    assert re.match(
-        r"glance, epoch 1 of 2: validation loss [\d.]+ for rendered patches \(the best so far\), with ", lines[2]
-    )
+    assert re.match(r"epoch 1 of 2: validation loss [\d.]+ for rendered patches \(the best so far\), with ", lines[2])
     model = tmp_path / "run" / "model.onnx"
-    assert lines[7:] == [
+    assert lines[4:] == [
         f"{model}: not measured, because no frames were held out",
         f"report: {tmp_path / 'run' / 'report.html'}",
         f"next: vm-detect --model {model} {seen} --object-radius 0.11 --save-overlay found",
     ]
     assert "nothing was measured" in (tmp_path / "run" / "report.html").read_text()
-
-
-@pytest.mark.long
-def test_a_wide_look_is_left_out(tune, tmp_path):
-    done = tune(tmp_path / "run", "--from", "ball")
-    assert (
-        done.stdout.splitlines()[0] == "ball: its wide look is left out; it would not know your objects of class ball"
-    )
-    before, after = read_model(model_path("ball")), read_model(tmp_path / "run" / "model.onnx")
-    assert [each.size for each in after.manifest.look.chain] == [each.size for each in before.manifest.look.chain[1:]]
-    assert len(after.look) == 2
-    assert CloseLook.of(after).glance is not None
 
 
 def test_a_fine_tuning_stays_on_the_processor(tune, whole, tmp_path):
@@ -132,31 +116,29 @@ def test_a_fine_tuning_stays_on_the_processor(tune, whole, tmp_path):
 
 def test_a_log_has_each_step_once(whole):
     folder, _ = whole
-    for stage in (1, 2):
-        records = [record for _, record in read_log(folder / "log.jsonl") if record["round"] == stage]
-        assert [each["step"] for each in records if "loss" in each] == list(range(1, 9))
-        assert [each["epoch"] for each in records if "epoch" in each] == [1, 2]
+    records = [record for _, record in read_log(folder / "log.jsonl")]
+    assert [each["step"] for each in records if "loss" in each] == list(range(1, 9))
+    assert [each["epoch"] for each in records if "epoch" in each] == [1, 2]
 
 
 def assert_same(folder, expected):
-    for name in ("model.onnx", "glance.pt", "look.pt", "result.json", "report.html", "log.jsonl"):
+    for name in ("model.onnx", "look.pt", "result.json", "report.html", "log.jsonl"):
         assert (folder / name).read_bytes() == (expected / name).read_bytes(), name
 
 
 @pytest.mark.parametrize(
     ("how", "wait"),
     [
-        (signal.SIGKILL, "tensorboard/round2"),
+        (signal.SIGKILL, "log.jsonl"),
         pytest.param(signal.SIGINT, "run.json", marks=pytest.mark.long),
         pytest.param(signal.SIGTERM, "log.jsonl", marks=pytest.mark.long),
-        pytest.param(signal.SIGKILL, "patches/glance-00000.npz", marks=pytest.mark.long),
-        pytest.param(signal.SIGTERM, "patches/look-00000.npz", marks=pytest.mark.long),
+        pytest.param(signal.SIGKILL, "patches/00000.npz", marks=pytest.mark.long),
         pytest.param(signal.SIGKILL, "model.onnx", marks=pytest.mark.long),
     ],
 )
 def test_what_is_stopped_at_any_moment_ends_with_the_same_bytes(how, wait, whole, frames, tiny, tmp_path):
     folder = tmp_path / "run"
-    given = ["--from", "ball-small", "--names", "0=ball", "--config", tiny, "--workers", 1]
+    given = ["--from", "ball", "--names", "0=ball", "--config", tiny, "--workers", 1]
     run_and_stop(how, folder, wait, 0, "tune", frames, *given)
     run("resume", folder, "--workers", 2)
     assert_same(folder, whole[0])
@@ -194,7 +176,7 @@ def complaint(frames, tmp_path, capsys):
 
 
 def test_mistakes_are_told_in_one_line(complaint, frames, tmp_path):
-    ball = ["--from", "ball-small", frames]
+    ball = ["--from", "ball", frames]
     assert "has no box of class ball" in complaint(*ball)
     assert "--names 0=ball" in complaint(*ball)
     assert "patience" in complaint(*ball, "--names", "0=ball", "--set", "training.patiense=3")
@@ -211,7 +193,7 @@ def test_boxes_that_are_only_in_the_test_leave_nothing(complaint, frames, tmp_pa
     splits = {seed: split_by_recording(pictures, 0.3, 0.3, seed).test for seed in range(99)}
     seed = next(seed for seed, taken in splits.items() if pictures[int(taken[0])].image.name[0] == "b")
     options = ("--names", "0=ball", "--set", f"data.split_seed={seed}", "--set", "data.test=0.3")
-    assert "part for training, has no box" in complaint(folder, "--from", "ball-small", *options)
+    assert "part for training, has no box" in complaint(folder, "--from", "ball", *options)
     assert not (tmp_path / "run").exists()
 
 
@@ -225,9 +207,7 @@ def test_strict_refuses_faults_before_it_writes_anything(frames, tmp_path, tune)
 
 
 def test_a_class_without_rendered_patches_needs_a_run(whole, tmp_path, complaint, frames):
-    shown = look_of(read_model(model_path("ball-small")))
-    assert shown.contract.object_class == "ball"
-    assert "holds no training" in complaint(frames, "--from", "ball-small", "--names", "0=ball", "--rendered", tmp_path)
+    assert "holds no training" in complaint(frames, "--from", "ball", "--names", "0=ball", "--rendered", tmp_path)
 
 
 def test_tune_config_prints_what_config_reads(tmp_path, tune):
@@ -240,9 +220,9 @@ def test_tune_config_prints_what_config_reads(tmp_path, tune):
 
 def test_weights_of_a_file_written_again_are_the_same(whole):
     """Reading a look network back from a model file and writing it again loses nothing."""
-    again = look_of(read_model(whole[0] / "model.onnx"))
+    (again,) = looks_of(read_model(whole[0] / "model.onnx"))
     patches = np.random.default_rng(0).integers(0, 256, (5, again.contract.size, again.contract.size, 3), np.uint8)
-    look = CloseLook.of(read_model(whole[0] / "model.onnx"))
+    look = CloseLook.of(read_model(whole[0] / "model.onnx"))["ball"]
     import torch
 
     with torch.inference_mode():

@@ -5,14 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.looking import look_at
+from tests.looks import look_contract
 from vm_embedded.detection.pyramid import Pyramid
-from vm_embedded.network.look_contract import LookContract
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED
 from vm_train.tuning.candidates import find_candidates, search_radii, seen_objects
-from vm_train.tuning.windows import WindowPlaces, Windows, grid_windows, jittered_windows, random_windows
+from vm_train.tuning.windows import Windows, grid_windows, jittered_windows, random_windows
 
-CONTRACT = LookContract(object_class="ball", size=16, extent=2.0, above=0.03, passes=1)
+CONTRACT = look_contract(size=16, extent=2.0)
 
 
 def windows(*rows):
@@ -23,9 +22,7 @@ def windows(*rows):
 class Bright:
     """Judges a patch by its bright pixels, as a look network would: probability, shift and size."""
 
-    def __init__(self, passes=1, glance=None):
-        self.glance = glance
-        self.contract = LookContract(object_class="ball", size=32, extent=2.0, above=0.03, passes=passes)
+    contract = look_contract(size=32, extent=2.0)
 
     def run(self, patches):
         bright = patches[..., 0] > 128
@@ -71,7 +68,7 @@ def test_more_windows_than_opencv_takes_at_once():
 
 def test_labels_follow_the_rules_of_places_on_the_plane():
     ball = windows((100.0, 80.0, 10.0))
-    found = windows((103, 76, 10), (108, 80, 10), (100, 80, 14.5), (100, 80, 20), (120, 80, 10)).label(ball)
+    found = windows((103, 76, 10), (111, 80, 10), (100, 80, 14.5), (100, 80, 20), (120, 80, 10)).label(ball)
     assert found.labels.tolist() == [OBJECT, UNLABELED, UNLABELED, NOTHING, NOTHING]
     np.testing.assert_allclose(found.targets[0], [-0.3, 0.4, 0.0], atol=1e-6)
     assert windows((1, 2, 3)).label(Windows.none()).labels.tolist() == [NOTHING]
@@ -84,7 +81,7 @@ def test_jittered_windows_always_show_their_object(x, y, radius, count, seed):
     assert len(made) == 2 * count
     labels = made.label(objects)
     sizes = np.exp(0.28)
-    near = np.hypot(labels.targets[:, 0], labels.targets[:, 1]) <= 0.6 * sizes + 1e-6
+    near = np.hypot(labels.targets[:, 0], labels.targets[:, 1]) <= 0.9 * sizes + 1e-6
     assert near[labels.labels == OBJECT].all()
     assert (labels.labels != NOTHING).all()
 
@@ -119,7 +116,7 @@ def test_sizes_to_look_for_cover_those_of_the_objects(rows):
 def test_the_network_finds_each_disk_once_wherever_it_is():
     true = windows((40.3, 60.0, 10.0), (150.0, 35.5, 14.0))
     pyramid = disks((40.3, 60.0, 10.0), (150.0, 35.5, 14.0))
-    seen, probabilities = seen_objects(pyramid, (200, 150), Bright(passes=2), np.array([7.0, 10.0, 14.0]), 0.1, 10)
+    seen, probabilities = seen_objects(pyramid, (200, 150), Bright(), np.array([7.0, 10.0, 14.0]), 0.1, 10)
     assert len(seen) == 2
     assert (probabilities > 0.8).all()
     assert (np.diff(probabilities) <= 0.0).all()
@@ -133,40 +130,8 @@ def test_the_network_finds_each_disk_once_wherever_it_is():
 def test_an_object_has_the_size_that_the_network_sees(radius):
     """Not that of the window: the sizes that it looks for are far apart."""
     pyramid = disks((80.0, 60.0, radius))
-    seen, _ = seen_objects(pyramid, (200, 150), Bright(passes=2), np.array([10.0]), 0.1, 10)
+    seen, _ = seen_objects(pyramid, (200, 150), Bright(), np.array([10.0]), 0.1, 10)
     assert seen.radii == pytest.approx([radius], rel=0.06)
-
-
-def test_the_first_of_all_glances_finds_the_candidates():
-    class Blind(Bright):
-        def run(self, patches):
-            raise AssertionError("only the first glance looks everywhere")
-
-    chain = Blind(glance=Blind(glance=Bright()))
-    assert len(find_candidates(disks((40.3, 60.0, 10.0)), (200, 150), chain, np.array([10.0]), 0.1, 10)) == 1
-
-
-def test_windows_tell_how_large_their_objects_are():
-    places = WindowPlaces(disks(), windows((44.0, 60.0, 10.0), (50.0, 20.0, 30.0)))
-    assert places.radii(np.array([1, 0])).tolist() == [30.0, 10.0]
-
-
-def test_windows_are_near_if_place_and_size_agree():
-    places = WindowPlaces(
-        disks(), windows((44.0, 60.0, 10.0), (46.0, 60.0, 10.0), (44.0, 64.0, 10.0), (44.0, 60.0, 12.0))
-    )
-    near = np.eye(4, dtype=bool)
-    near[0, 1] = near[1, 0] = True
-    assert places.near(np.arange(4)).tolist() == near.tolist()
-    assert places.near(np.array([1, 3])).tolist() == np.eye(2, dtype=bool).tolist()
-
-
-def test_a_look_leaves_the_windows_that_it_was_given_as_they_are():
-    given_windows = windows((44.0, 60.0, 10.0))
-    places = WindowPlaces(disks((40.3, 60.0, 10.0)), given_windows)
-    look_at(places, Bright())
-    assert given_windows.centers.tolist() == [[44.0, 60.0]]
-    assert places.windows.centers[0, 0] == pytest.approx(40.3, abs=0.5)
 
 
 def test_beside_an_object_means_neither_in_it_nor_around_it():

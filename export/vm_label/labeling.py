@@ -20,7 +20,7 @@ from .sizing import box_at
 _ID = re.compile("[0-9a-f]{16}")
 
 
-class Session:
+class Labeling:
     """What the page shows and changes. Its methods may be called from several threads.
 
     answers: by crop, oldest first. file: gets each new answer.

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats, Mask
-from vm_embedded.detection.looking import look_closely
+from vm_embedded.arrays import Mask
+from vm_embedded.detection.looking import Sought, judge_peaks
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -21,33 +22,11 @@ from vm_export.look_network import LookNetwork
 from vm_workstation.worker_process import results_of
 
 from ..scores.calibration import logits_from
+from ..scores.object_ranking import Ranking
 from .labels import OBJECT, UNLABELED, VISIBLE, label_places
 from .observing import Observer, RunPicture, items_of
 from .run import LookRun
 from .torch_look import TorchLook
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """n objects that were found in pictures: logits (n,) before the calibration, and whether each is right (n,).
-
-    objects: number of true objects that are visible. pictures: number of pictures.
-    """
-
-    logits: Floats
-    right: Mask
-    objects: int
-    pictures: int
-
-    @classmethod
-    def joined(cls, parts: Sequence[Found]) -> Found:
-        """All objects of several parts."""
-        return cls(
-            np.concatenate([np.empty(0), *(each.logits for each in parts)]),
-            np.concatenate([np.empty(0, dtype=np.bool_), *(each.right for each in parts)]),
-            sum(each.objects for each in parts),
-            sum(each.pictures for each in parts),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,23 +40,24 @@ class Judge:
     @classmethod
     def of(cls, run: LookRun, network: LookNetwork, contract: LookContract) -> Judge:
         """The judge of a run. network: not calibrated yet. Raises InputError or ModelError."""
-        settings = Settings(max_proposals=run.configuration.patches.proposals, min_confidence=0.0)
-        return cls(Observer.of(run), TorchLook(network, contract, TorchLook.of(run.glance())), settings)
+        return cls(Observer.of(run), TorchLook(network, contract), Settings(min_confidence=0.0))
 
-    def __call__(self, item: RunPicture) -> Found:
-        """The objects in a picture; none if it can't be used."""
+    def __call__(self, item: RunPicture) -> Ranking:
+        """The objects in a picture, with logits before the calibration; none if it can't be used."""
         try:
             seen = self.observer.observe(item.files)
         except (InputError, GeometryError):  # was reported when the patches were collected
-            return Found(np.empty(0), np.empty(0, dtype=np.bool_), 0, 0)
-        judged = look_closely(seen.observation, self.look, seen.probabilities, self.settings, Stopwatch())
+            return Ranking.empty()
+        sought = Sought(seen.observation.view, seen.peaks, self.look)
+        (judged,) = judge_peaks(seen.observation, [sought], self.settings, Stopwatch())
         kept = sorted((each for each in judged if each.reason is None), key=lambda each: -each.confidence)
         centers = np.array([each.center for each in kept]).reshape(-1, 3)
         found = label_places(Tangents.at(seen.observation.view, centers), seen.truths)
         logits = logits_from(np.array([each.confidence for each in kept], dtype=np.float64))
         counted = (found.labels != UNLABELED) & ~shown_before(found.of)
         visible = int((seen.truths.visible >= VISIBLE).sum())
-        return Found(logits[counted], found.labels[counted] == OBJECT, visible, 1)
+        right = found.labels[counted] == OBJECT
+        return Ranking(confidence=logits[counted], right=right, truths=visible, pictures=1)
 
 
 def shown_before(objects: npt.NDArray[np.int64]) -> Mask:
@@ -92,15 +72,15 @@ def shown_before(objects: npt.NDArray[np.int64]) -> Mask:
 
 def judge_validation(
     run: LookRun, network: LookNetwork, contract: LookContract, workers: int, report: Callable[[int], None]
-) -> Found:
-    """What is found in the validation pictures of a run, with so many processes; 1 uses only this process.
+) -> Ranking:
+    """What is found in the validation pictures of a run, with logits; workers: processes, 1 uses only this process.
 
     report: is called with the number of pictures that are done. Raises InputError and VisualMeshError.
     """
     items = [each for each in items_of(run) if each.validates]
-    parts: list[Found] = []
+    found, done = Ranking.empty(), count(1)
     with closing(results_of(partial(Judge.of, run, network, contract), items, workers)) as results:
         for part in results:
-            parts.append(part)
-            report(len(parts))
-    return Found.joined(parts)
+            found += part
+            report(next(done))
+    return found
