@@ -88,26 +88,21 @@ networks: need-HDRI .venv/dev ## train the networks of the package from their se
 	$(MAKE) data OUT=$(PICTURES) COUNT=16000 SEED=1 SCENES=export/vm_synth/varied.toml
 	$(BIN)/python -m benchmarks.calibration_data $(HDRI) $(CALIBRATION)
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
-	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED, write_rendered; \
-		from vm_train.tuning.rendered_sample import sample_run; write_rendered(RENDERED, sample_run(Path('$(BUILD)/ball-look')))"
+	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED; \
+		from vm_train.tuning.rendered_sample import write_sample; write_sample(RENDERED, Path('$(BUILD)/look'))"
 
 # Train in the folder of the target, with the first prerequisite as configuration, or go on with that training.
 train = if test -e $(@D)/run.json; then $(BIN)/vm-train resume $(@D); else $(BIN)/vm-train $(1) -o $(@D) --config $<; fi
 
-.PRECIOUS: $(BUILD)/%/model.pt $(BUILD)/%-look/look.pt
+.PRECIOUS: $(BUILD)/%/model.pt $(BUILD)/look/look.pt
 $(BUILD)/ball/model.pt $(BUILD)/soccer/model.pt: $(BUILD)/%/model.pt: export/networks/%.toml
 	$(call train,$(PICTURES) --unpacked $(BUILD)/unpacked)
 
-$(BUILD)/%-look/look.pt: export/networks/%-look.toml $(BUILD)/soccer/model.pt
+$(BUILD)/look/look.pt: export/networks/look.toml $(BUILD)/soccer/model.pt
 	$(call train,look $(PICTURES) --from $(BUILD)/soccer/model.pt)
 
-$(BUILD)/ball.onnx: $(BUILD)/ball/model.pt $(BUILD)/ball-look/look.pt
-	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt $(CANARY) -o $@
-
-$(BUILD)/soccer.onnx: $(BUILD)/soccer/model.pt $(BUILD)/ball-look/look.pt $(BUILD)/goal-look/look.pt $(BUILD)/robot-look/look.pt
-	$(BIN)/vm-export $< --look $(BUILD)/ball-look/look.pt $(CANARY) -o $(BUILD)/balls.onnx
-	$(BIN)/vm-export $(BUILD)/balls.onnx --look $(BUILD)/goal-look/look.pt -o $(BUILD)/balls-and-posts.onnx
-	$(BIN)/vm-export $(BUILD)/balls-and-posts.onnx --look $(BUILD)/robot-look/look.pt -o $@
+$(BUILD)/%.onnx: $(BUILD)/%/model.pt $(BUILD)/look/look.pt
+	$(BIN)/vm-export $< --look $(BUILD)/look/look.pt $(CANARY) -o $@
 
 vm_embedded/models/%.onnx: $(BUILD)/%.onnx
 	$(CALIBRATE) $< $(CALIBRATION)/* -o $@

@@ -11,7 +11,7 @@ import torch
 import vm_embedded
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.look_contract import LookContract, look_key
+from vm_embedded.network.look_contract import LOOK_KEY, LookContract
 from vm_embedded.network.look_example import LookTest, made_patches
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 
@@ -35,16 +35,18 @@ _PARTS = 256
 def attached(content: bytes, manifest: Manifest, look: LookCheckpoint) -> tuple[bytes, float]:
     """A model file's bytes with a look network, and the largest difference of an answer to torch.
 
-    content, manifest: of the model file. The look network for the same class is replaced. The examples become the
-    self-test. Raises ModelError if the file's network has no peaks for the class.
+    content, manifest: of the model file, whose look network is replaced. Classes of the look that the file's network
+    has no peaks for are left out. The examples become the self-test. Raises ModelError if none is left.
     """
+    look = look.part(manifest.peaks)
     file = look_model(look.network.eval())
     difference = largest_look_difference(file, look)
     provenance = {**look.contract.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
     contract = replace(tested_contract(look), provenance=provenance)
-    others = tuple(each for each in manifest.looks if each.object_class != contract.object_class)
-    changed = replace(manifest, looks=(*others, contract))
-    entries = {look_key(contract.object_class): base64.b64encode(file).decode(), METADATA_KEY: changed.as_json()}
+    entries = {
+        LOOK_KEY: base64.b64encode(file).decode(),
+        METADATA_KEY: replace(manifest, look=contract).as_json(),
+    }
     return with_metadata(content, entries), difference
 
 
@@ -54,22 +56,25 @@ def tested_contract(look: LookCheckpoint) -> LookContract:
 
 
 def _self_test(look: LookCheckpoint) -> LookTest:
-    """The most and the least likely example of a look network, with its answers to them and to patches made of them.
+    """The most and the least likely example of each class, with the answers to them and to patches made of them.
 
-    A network that is unsure of none of these also gets the mixture of both that it is least sure of: damaged weights
-    hardly change answers that are nearly 0 or 1.
+    For each class that a network is unsure of in none of these, there is also the mixture of both that it is least sure
+    of: damaged weights hardly change answers that are nearly 0 or 1.
     """
-    probabilities = _answers(look.network.eval(), look.examples)[:, 0]
-    likely, unlikely = int(probabilities.argmax()), int(probabilities.argmin())
+    probabilities = _answers(look.network.eval(), look.examples)[..., 0]
+    likely, unlikely = probabilities.argmax(axis=0), probabilities.argmin(axis=0)
     test = _tested(look.network, look.examples[np.unique([likely, unlikely])])
     low, high = _UNSURE
-    if ((test.answers[:, 0] > low) & (test.answers[:, 0] < high)).any():
+    unsure = ((test.answers[..., 0] > low) & (test.answers[..., 0] < high)).any(axis=0)
+    if unsure.all():
         return test
     shares = np.arange(1, _PARTS)[:, None, None, None]
-    one, other = look.examples[likely].astype(np.int32), look.examples[unlikely].astype(np.int32)
-    mixtures = (((_PARTS - shares) * one + shares * other) // _PARTS).astype(np.uint8)
-    least_sure = np.abs(_answers(look.network, mixtures)[:, 0] - 0.5).argmin()
-    return _tested(look.network, np.concatenate([test.patches, mixtures[[least_sure]]]))
+    added = []
+    for number in np.flatnonzero(~unsure):
+        one, other = (look.examples[rows[number]].astype(np.int32) for rows in (likely, unlikely))
+        mixtures = (((_PARTS - shares) * one + shares * other) // _PARTS).astype(np.uint8)
+        added.append(mixtures[np.abs(_answers(look.network, mixtures)[:, number, 0] - 0.5).argmin()])
+    return _tested(look.network, np.concatenate([test.patches, added]))
 
 
 def _tested(network: LookNetwork, patches: Image) -> LookTest:
@@ -78,9 +83,8 @@ def _tested(network: LookNetwork, patches: Image) -> LookTest:
 
 
 def detached(content: bytes, manifest: Manifest) -> bytes:
-    """A model file's bytes without its look networks. content, manifest: of the model file."""
-    removed: dict[str, str | None] = {look_key(each.object_class): None for each in manifest.looks}
-    return with_metadata(content, removed | {METADATA_KEY: replace(manifest, looks=()).as_json()})
+    """A model file's bytes without its look network. content, manifest: of the model file."""
+    return with_metadata(content, {LOOK_KEY: None, METADATA_KEY: replace(manifest, look=None).as_json()})
 
 
 def largest_look_difference(content: bytes, look: LookCheckpoint) -> float:
@@ -98,7 +102,7 @@ def largest_look_difference(content: bytes, look: LookCheckpoint) -> float:
 
 
 def _answers(network: LookNetwork, patches: Image) -> Singles:
-    """Torch's answers (n, 4) to patches."""
+    """Torch's answers (n, C, 4) to patches."""
     with torch.inference_mode():
         answers: Singles = network(torch.from_numpy(np.ascontiguousarray(patches))).numpy()
     return answers

@@ -1,8 +1,8 @@
-"""A model file with other look networks, another confidence or another canary; its mesh network stays as it is."""
+"""A model file with another look network, another confidence or another canary; its mesh network stays as it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,56 +15,54 @@ from vm_embedded.network.model_file import read_model
 from .attach_canary import CanaryPicture, NotFoundError, with_canary
 from .attach_look import detached, tested_contract
 from .calibrated_peaks import with_calibrated_peaks
-from .export import with_looks
+from .export import with_look
 from .look_checkpoint import LookCheckpoint
-from .look_weights import looks_of
+from .look_weights import look_of
 from .metadata import with_metadata
 from .network_weights import network_of
 from .self_testing import strong_self_test
 
 
 @dataclass(frozen=True)
-class ChangedLooks:
-    """What became of a model file. difference: largest one to torch of the looks' answers, 0 without a look.
+class ChangedLook:
+    """What became of a model file. difference: largest one to torch of the look's answers, 0 without a look.
     lost_canary: whether the file had a canary that its networks do not find any more."""
 
     difference: float
     lost_canary: bool
 
 
-def change_looks(model: str | Path, path: str | Path, looks: Sequence[LookCheckpoint]) -> ChangedLooks:
-    """Write a copy of a model file with these look networks, or without any; its mesh network stays as it is.
-
-    Each replaces the one for the same class, and others stay. An empty list removes all.
+def change_look(model: str | Path, path: str | Path, look: LookCheckpoint | None) -> ChangedLook:
+    """Write a copy of a model file with this look network, or without one; its mesh network stays as it is.
 
     Its canary gets the new answers, or is removed if the networks do not find every class in it any more.
 
-    Raises ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, if a look does not fit the
+    Raises ModelError if an answer differs from torch by more than LARGEST_DIFFERENCE, if the look does not fit the
     file's classes, or if there is no look to remove. Raises InputError if the file can't be written.
     """
-    read = read_model(model)
-    content, difference = with_looks(path, read.content, looks)
-    if not looks:
-        if not read.looks:
-            raise ModelError(f"{model} has no close look to remove")
+    read, difference = read_model(model), 0.0
+    if look is not None:
+        content, difference = with_look(path, read.content, look)
+    elif read.manifest.look is None:
+        raise ModelError(f"{model} has no close look to remove")
+    else:
         content = detached(read.content, read.manifest)
-    return ChangedLooks(difference, _finish(path, content, read.canary))
+    return ChangedLook(difference, _finish(path, content, read.canary))
 
 
 def change_confidence(
-    model: str | Path,
-    path: str | Path,
-    looks: Sequence[LookCheckpoint],
-    peaks: Mapping[str, tuple[float, float]],
+    model: str | Path, path: str | Path, look: LookCheckpoint | None, peaks: Mapping[str, tuple[float, float]]
 ) -> bool:
-    """Write a copy of a model file with these look networks, each in the place of the one for the same class, and with
-    other scores of peaks: `scale * score + offset`, by class. Returns whether its canary is lost, as in ChangedLooks.
+    """Write a copy of a model file with this look network, or the one it has, and with other scores of peaks:
+    `scale * score + offset`, by class. Returns whether its canary is lost, as in ChangedLook.
 
-    Raises ModelError and InputError as `change_looks`.
+    Raises ModelError and InputError as `change_look`.
     """
     read = read_model(model)
     content = with_calibrated_peaks(path, read, peaks) if peaks else read.content
-    return _finish(path, with_looks(path, content, looks)[0], read.canary)
+    if look is not None:
+        content, _ = with_look(path, content, look)
+    return _finish(path, content, read.canary)
 
 
 def _finish(path: str | Path, content: bytes, canary: Canary | None) -> bool:
@@ -94,9 +92,10 @@ def change_canary(model: str | Path, path: str | Path, canary: CanaryPicture) ->
     file can't be written.
     """
     read = read_model(model)
+    look = look_of(read)
     manifest = replace(
         read.manifest,
         self_test=strong_self_test(network_of(read).network, read.manifest),
-        looks=tuple(map(tested_contract, looks_of(read))),
+        look=None if look is None else tested_contract(look),
     )
     write_file(Path(path), with_canary(with_metadata(read.content, {METADATA_KEY: manifest.as_json()}), canary))

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_OK, Parser, program
-from vm_embedded.errors import InputError, VisualMeshError, not_installed
+from vm_embedded.errors import InputError, ModelError, VisualMeshError, not_installed
 from vm_embedded.files import check_writable
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.manifest import EDGES, Manifest
+from vm_embedded.network.manifest import EDGES
 from vm_embedded.network.model_file import read_model
 
 if TYPE_CHECKING:
@@ -41,15 +41,15 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--to-yaml", action="store_true", help="write the format of the reference implementation instead"
     )
-    looks = parser.add_mutually_exclusive_group()
-    looks.add_argument(
+    look = parser.add_mutually_exclusive_group()
+    look.add_argument(
         "--look",
         type=Path,
         metavar="LOOK",
-        help="checkpoint (.pt) of a close look to write into the model file, instead of the one for the same class; or "
-        "a model file (.onnx, or the name of a network of the package), whose close looks at these classes are taken",
+        help="checkpoint (.pt) of a close look to write into the model file; or a model file (.onnx, or the name of a "
+        "network of the package) that has one. Classes that MODEL has no peaks for are left out",
     )
-    looks.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close looks")
+    look.add_argument("--no-look", action="store_true", help="copy a model file (.onnx) without its close look")
     parser.add_argument(
         "--canary",
         type=Path,
@@ -127,16 +127,16 @@ def _checked_output(options: argparse.Namespace) -> Path:
 
 
 def _change_model(options: argparse.Namespace, output: Path, canary: CanaryPicture | None) -> None:
-    """Write a copy of a model file with another canary, or with other close looks."""
-    from .change_model import change_canary, change_looks, lost_canary_message
+    """Write a copy of a model file with another canary, or with another close look."""
+    from .change_model import change_canary, change_look, lost_canary_message
 
     if canary is not None:
         change_canary(options.model, output, canary)
-        _print_written(output, f"networks of {options.model} with a new canary", [], None)
+        _print_written(output, f"networks of {options.model} with a new canary", None)
         return
-    looks = _read_looks(options, read_model(options.model).manifest)
-    changed = change_looks(options.model, output, looks)
-    _print_written(output, f"mesh network of {options.model}", looks, changed.difference if looks else None)
+    look = _read_look(options)
+    changed = change_look(options.model, output, look)
+    _print_written(output, f"mesh network of {options.model}", changed.difference if look else None)
     if changed.lost_canary:
         print(f"vm-export: {lost_canary_message(output, options.model)}", file=sys.stderr)
 
@@ -152,20 +152,21 @@ def _export_checkpoint(options: argparse.Namespace, output: Path, canary: Canary
         write_reference(checkpoint, output)
         print(f"{output}: written in the format of the reference implementation")
         return
-    looks = _read_looks(options, checkpoint.manifest)
-    _print_written(output, "mesh network", looks, export(checkpoint, output, looks, canary))
+    look = _read_look(options)
+    _print_written(output, "mesh network", export(checkpoint, output, look, canary))
 
 
-def _read_looks(options: argparse.Namespace, manifest: Manifest) -> list[LookCheckpoint]:
-    """The close looks of --look for a network with this manifest. Raises InputError or ModelError."""
+def _read_look(options: argparse.Namespace) -> LookCheckpoint | None:
+    """The close look of --look. Raises InputError, and ModelError for a model file without one."""
     from .look_checkpoint import LookCheckpoint
-    from .look_weights import looks_for
+    from .look_weights import look_of
 
-    if options.look is None:
-        return []
-    if _is_model_file(options.look):
-        return looks_for(manifest, read_model(options.look))
-    return [LookCheckpoint.load(options.look)]
+    if options.look is None or not _is_model_file(options.look):
+        return options.look and LookCheckpoint.load(options.look)
+    look = look_of(read_model(options.look))
+    if look is None:
+        raise ModelError(f"{options.look} has no close look")
+    return look
 
 
 def _is_model_file(path: Path) -> bool:
@@ -202,12 +203,12 @@ def _check_options(options: argparse.Namespace) -> None:
         raise InputError("a model file gets another close look or another canary; give one of the two options")
 
 
-def _print_written(path: Path, content: str, looks: Sequence[LookCheckpoint], difference: float | None) -> None:
+def _print_written(path: Path, content: str, difference: float | None) -> None:
     """Print a line about a written file: its networks, its size, and the difference to torch of those that are new."""
-    parts = [content]
-    for each in (look.contract for look in looks):
-        channels = ", ".join(map(str, each.channels))
-        parts.append(f"close look at {each.object_class} ({each.size} x {each.size}, channels {channels})")
+    parts, look = [content], read_model(path).manifest.look
+    if look is not None:
+        channels = ", ".join(map(str, look.channels))
+        parts.append(f"close look at {', '.join(look.names)} ({look.size} x {look.size}, channels {channels})")
     parts.append(f"{path.stat().st_size / 1000:.1f} kB")
     if difference is not None:
         parts.append(f"largest difference to torch {difference:.1e}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,12 +44,12 @@ def onnx_model(network: MeshNetwork, manifest: Manifest) -> bytes:
 def export(
     checkpoint: Checkpoint,
     path: str | Path,
-    looks: Sequence[LookCheckpoint] = (),
+    look: LookCheckpoint | None = None,
     canary: CanaryPicture | None = None,
 ) -> float:
     """Write the model file of a checkpoint and return the largest difference to torch of an answer.
 
-    looks: look networks to write into the same file. canary: a picture that becomes its canary. ONNX Runtime runs the
+    look: network to write into the same file. canary: a picture that becomes its canary. ONNX Runtime runs the
     networks before the file is written. Raises ModelError if an answer differs by more than LARGEST_DIFFERENCE, or a
     look does not fit the classes, and InputError if the picture does not show every class, or the file can't be
     written.
@@ -59,7 +58,7 @@ def export(
     provenance = {**checkpoint.manifest.provenance, "exported_by": f"vm-export {vm_embedded.__version__}"}
     manifest = replace(
         checkpoint.manifest,
-        looks=(),
+        look=None,
         operations=network.shape.operations,
         provenance=provenance,
     )
@@ -67,26 +66,24 @@ def export(
     content = onnx_model(network, manifest)
     difference = largest_difference(content, network, manifest)
     check_difference(path, "probabilities", difference)
-    content, look_difference = with_looks(path, content, looks)
-    difference = max(difference, look_difference)
+    if look is not None:
+        content, look_difference = with_look(path, content, look)
+        difference = max(difference, look_difference)
     if canary is not None:
         content = with_canary(content, canary)
     write_file(Path(path), content)
     return difference
 
 
-def with_looks(path: str | Path, content: bytes, looks: Sequence[LookCheckpoint]) -> tuple[bytes, float]:
-    """A model file's bytes with these look networks, and the largest difference to torch of their answers.
+def with_look(path: str | Path, content: bytes, look: LookCheckpoint) -> tuple[bytes, float]:
+    """A model file's bytes with this look network, and the largest difference to torch of its answers.
 
-    Each replaces the one for the same class, and others stay. path: of the file that is to be written. Raises
-    ModelError if an answer differs by more than LARGEST_DIFFERENCE, or if a look does not fit the file's classes.
+    path: of the file that is to be written. Raises ModelError if an answer differs by more than LARGEST_DIFFERENCE, or
+    if the look judges no class that the file has peaks for.
     """
-    largest = 0.0
-    for look in looks:
-        content, difference = attached(content, parse_model(path, content).manifest, look)
-        check_difference(path, "answers of the close look", difference)
-        largest = max(largest, difference)
-    return content, largest
+    content, difference = attached(content, parse_model(path, content).manifest, look)
+    check_difference(path, "answers of the close look", difference)
+    return content, difference
 
 
 def check_difference(path: str | Path, what: str, difference: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,11 +13,12 @@ import torch
 from vm_embedded.arrays import Image
 from vm_embedded.errors import InputError, ModelError, one_line
 from vm_embedded.network.look_contract import LookContract
+from vm_embedded.network.look_example import ANSWERS
 
 from .look_network import LookNetwork, LookShape
 from .torch_files import load_values, save_values
 
-LOOK_FORMAT = "vm-embedded look 4"
+LOOK_FORMAT = "vm-embedded look 5"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +40,10 @@ class LookCheckpoint:
                 f"the look network has size {shape.size} and channels {list(shape.channels)}, but its contract says "
                 f"{contract.size} and {list(contract.channels)}"
             )
+        if len(contract.classes) != shape.classes:
+            raise ModelError(
+                f"the look network judges {shape.classes} classes, but its contract has {list(contract.names)}"
+            )
         sides = (shape.size, shape.size, 3)
         if self.examples.dtype != np.uint8 or self.examples.shape[1:] != sides or not len(self.examples):
             raise ModelError(
@@ -45,18 +51,45 @@ class LookCheckpoint:
                 f"{self.examples.dtype} {self.examples.shape}"
             )
 
-    def recalibrated(self, scale: float, offset: float, source: str) -> LookCheckpoint:
-        """The same network, whose probability, with the peak's score that counts in it, has the logit
+    def part(self, names: Collection[str]) -> LookCheckpoint:
+        """The same network for those of its classes that have these names. Raises ModelError if there is none."""
+        kept = [number for number, name in enumerate(self.contract.names) if name in names]
+        if not kept:
+            raise ModelError(
+                f"the close look judges {', '.join(self.contract.names)}, but the classes are "
+                f"{', '.join(sorted(names)) or 'none'}"
+            )
+        network = LookNetwork(replace(self.network.shape, classes=len(kept)))
+        answers = (torch.tensor(kept)[:, None] * len(ANSWERS) + torch.arange(len(ANSWERS))).flatten()
+        state = self.network.state_dict()
+        state |= {name: state[name][answers] for name in ("answers.weight", "answers.bias")}
+        network.load_state_dict(state | {"calibration": state["calibration"][kept]})
+        contract = replace(self.contract, classes=tuple(self.contract.classes[number] for number in kept))
+        return replace(self, network=network.eval(), contract=contract)
+
+    def weighted(self, weight: float) -> LookCheckpoint:
+        """The same network, beside whose answers the scores of peaks count with this weight for each class."""
+        classes = tuple(replace(each, mesh_weight=weight) for each in self.contract.classes)
+        return replace(self, contract=replace(self.contract, classes=classes))
+
+    def recalibrated(
+        self, name: str, scale: float, offset: float, source: str, weight: float | None = None
+    ) -> LookCheckpoint:
+        """The same network, whose probability of a class, with the peak's score that counts in it, has the logit
         `scale * logit + offset`.
 
-        source: the answers that the scale and the offset fit, for the provenance.
+        weight: of the peak's score in that logit; None: the one that it has. source: the answers that the scale and the
+        offset fit, for the provenance.
         """
-        network, (first, before) = copy.deepcopy(self.network), self.network.calibration.tolist()
-        network.calibration.copy_(torch.tensor([scale * first, scale * before + offset]))
-        provenance = {**self.contract.provenance, "calibrated_on": source}
-        weight = scale * self.contract.mesh_weight
+        network, number = copy.deepcopy(self.network), self.contract.names.index(name)
+        first, before = network.calibration[number].tolist()
+        network.calibration[number] = torch.tensor([scale * first, scale * before + offset])
+        classes = list(self.contract.classes)
+        old = classes[number].mesh_weight if weight is None else weight
+        classes[number] = replace(classes[number], mesh_weight=scale * old)
+        provenance = {**self.contract.provenance, f"calibrated_on_{name}": source}
         return replace(
-            self, network=network, contract=replace(self.contract, provenance=provenance, mesh_weight=weight)
+            self, network=network, contract=replace(self.contract, provenance=provenance, classes=tuple(classes))
         )
 
     def save(self, path: str | Path) -> None:

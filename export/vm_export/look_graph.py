@@ -15,15 +15,15 @@ from vm_embedded.arrays import Floats
 from vm_embedded.network.look_example import ANSWERS
 
 from .eight_bits import integers_of
-from .look_network import NOISE_FLOOR, LookNetwork
+from .look_network import FIRST_OF_SUM, LAST_OF_SUM, NOISE_FLOOR, LookNetwork
 from .onnx_graph import FLOAT, UINT8, OnnxGraph
 
 
 def look_model(network: LookNetwork) -> bytes:
-    """The bytes of an ONNX model. Input: patches (n, size, size, 3) uint8. Output: answers (n, 4) float32."""
+    """The bytes of an ONNX model. Input: patches (n, size, size, 3) uint8. Output: answers (n, C, 4) float32."""
     graph, size = OnnxGraph(), network.shape.size
     weights = {name: value.detach().double().numpy() for name, value in network.state_dict().items()}
-    x = _write_normalization(graph, size)
+    before = x = _write_normalization(graph, size)
     for index, layer in enumerate(network.typed_convolutions):
         kernel, bias = weights[f"convolutions.{index}.weight"], weights[f"convolutions.{index}.bias"]
         side, step, columns = layer.kernel_size[0], layer.stride[0], 1
@@ -35,24 +35,32 @@ def look_model(network: LookNetwork) -> bytes:
             "strides": [step, step * columns],
             "group": layer.groups,
         }
+        if index == FIRST_OF_SUM:
+            before = x
         x = _write_layer(graph, "Conv", f"layer{index}", x, kernel, bias, **geometry)
         x = graph.node("Relu", [x], f"layer{index}.activation")
+        if index == LAST_OF_SUM:
+            x = graph.node("Add", [x, before], "sum")
     x = graph.node("Flatten", [x], "flat", axis=1)
     x = _write_layer(graph, "Gemm", "hidden", x, weights["hidden.weight"], weights["hidden.bias"], transB=1)
     x = graph.node("Relu", [x], "hidden.activation")
 
     # The calibration, a scale and an offset of the probability's logit, becomes part of the last layer's weights.
     kernel, bias = weights["answers.weight"].copy(), weights["answers.bias"].copy()
-    scale, offset = weights["calibration"]
-    kernel[0], bias[0] = kernel[0] * scale, bias[0] * scale + offset
+    scale, offset = weights["calibration"].T
+    count, classes = len(ANSWERS), network.shape.classes
+    kernel[::count], bias[::count] = kernel[::count] * scale[:, None], bias[::count] * scale + offset
     linear = _write_layer(graph, "Gemm", "last", x, kernel, bias, transB=1)
-    is_probability = graph.constant("last.is_probability", [name == "probability" for name in ANSWERS])
-    graph.node("Where", [is_probability, graph.node("Sigmoid", [linear], "last.sigmoid"), linear], "answers")
+    is_probability = graph.constant("last.is_probability", [name == "probability" for name in ANSWERS] * classes)
+    chosen = [is_probability, graph.node("Sigmoid", [linear], "last.sigmoid"), linear]
+    by_class = graph.constant("last.shape", [-1, classes, count])
+    graph.node("Reshape", [graph.node("Where", chosen, "last.answers"), by_class], "answers")
     return graph.model(
         {"patches": (UINT8, ["n", size, size, 3])},
-        {"answers": (FLOAT, ["n", len(ANSWERS)])},
+        {"answers": (FLOAT, ["n", classes, count])},
         {},
-        "Look network of a Visual Mesh model: probability, shift to the right and down, and log size, for each patch.",
+        "Look network of a Visual Mesh model. Of each class in each patch: probability, shift to the right and down, "
+        "and log size.",
     )
 
 

@@ -69,7 +69,7 @@ def network_of(model: ModelFile) -> Checkpoint:
         raise ModelError(f"{foreign}: {error}") from error
     if not difference <= LARGEST_DIFFERENCE:
         raise ModelError(f"{foreign}: its answers differ from those of the layers by {difference:.2g}")
-    return Checkpoint(network, replace(manifest, operations=0, self_test=None, looks=()))
+    return Checkpoint(network, replace(manifest, operations=0, self_test=None, look=None))
 
 
 def _network(layers: list[_Weights], neighbors: int) -> Network:

@@ -43,7 +43,7 @@ class Detector:
         self.settings = settings or Settings()
         self.manifest = model.manifest.used_for(self.settings.object_radius, self.settings.max_distance)
         self.session = Session(model, self.settings.threads, self.settings.spinning)
-        self.looks = CloseLook.of(model, self.settings.threads, self.settings.spinning)
+        self.look = CloseLook.of(model, self.settings.threads, self.settings.spinning)
         self.cache = MeshCache(self.manifest, self.settings)
         self.shape = self.manifest.object_shape
 
@@ -109,7 +109,7 @@ class Detector:
         """
         watch = Stopwatch()
         is_wanted = self.settings.field_features
-        judged = judge_classes(observation, self.looks, self.settings, watch, explain, is_wanted)
+        judged = judge_classes(observation, self.look, self.settings, watch, explain, is_wanted)
         found, rejected = locate(observation, judged, self.settings, watch, explain)
         features = locate_features(observation, judged) if is_wanted else None
         if features is not None:

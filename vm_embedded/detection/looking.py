@@ -13,12 +13,12 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Floats, Image, Singles
+from ..arrays import Chosen, Floats, Image, Singles
 from ..field.features import UPRIGHTS
 from ..geometry.circle import Circle
 from ..network.look_contract import LookContract
 from .observation import Observation
-from .patches import Tangents, cut_places
+from .patches import cut_places
 from .peaks import LARGEST_SIZE, Peaks, probability_of
 from .prepared_view import PreparedView
 from .settings import Settings
@@ -26,6 +26,9 @@ from .stopwatch import Stopwatch
 
 _NEAR = 0.3
 """Places within this share of an object's radius around its center were meant to be its center."""
+
+_DOUBTFUL = 3.0
+"""Log-odds up to which a place gets a second look: probabilities from 0.05 to 0.95."""
 
 _SUREST = 1.0 - 1e-6
 """Limit of a probability: one that is rounded to 1 would outvote all others in a mean, and pass a threshold of 1."""
@@ -38,10 +41,10 @@ class Look(Protocol):
     def contract(self) -> LookContract: ...
 
     def run(self, patches: Image) -> Singles:
-        """Answers (n, 4) to patches (n, size, size, 3), RGB uint8.
+        """Answers (n, C, 4) to patches (n, size, size, 3), RGB uint8.
 
-        They are the object's probability, the shift of its center to the right and down, in expected radii, and the
-        logarithm of its apparent radius over the expected one. Raises ModelError.
+        For each class of the contract, they are the object's probability, the shift of its center to the right and
+        down, in expected radii, and the logarithm of its apparent radius over the expected one. Raises ModelError.
         """
 
 
@@ -63,30 +66,33 @@ class Judgment:
 class Sought:
     """Objects of a class, which are sought at peaks.
 
-    view: of objects of their class. peaks: best first. look: the look network for the class; it judges the best peaks.
-    Without it, the peaks are the objects.
+    view: of objects of their class. peaks: that may be objects, best first. number: of the class among those of the
+    look network; None if it does not judge the class, and the peaks are the objects.
     """
 
     view: PreparedView
     peaks: Peaks
-    look: Look | None
+    number: int | None
 
-    @property
-    def best(self) -> Peaks:
-        """The peaks that may be objects."""
-        return self.peaks if self.look is None else self.peaks.part(slice(self.look.contract.max_proposals))
+    @classmethod
+    def of(cls, observation: Observation, name: str, contract: LookContract | None) -> Sought:
+        """The objects of a class that the network has peaks for. The base of an upright is a circle on the plane.
+
+        contract: of the look network, if there is one.
+        """
+        number = contract.names.index(name) if contract is not None and name in contract.names else None
+        view, peaks = observation.view, observation.peaks[name]
+        if observation.manifest.classes[observation.manifest.column(name)].kind == "upright":
+            judged = None if contract is None or number is None else contract.classes[number]
+            view = around_bases(observation, observation.manifest.radius if judged is None else judged.upright_radius)
+            peaks = peaks.apart(view)
+        most = len(peaks) if contract is None or number is None else contract.max_proposals
+        return cls(view, peaks.part(slice(most)), number)
 
 
 def around_bases(observation: Observation, radius: float) -> PreparedView:
     """The same points, where circles on the plane with this radius [m] are sought: one around each base."""
     return observation.view._replace(shape=Circle(radius))
-
-
-def sought_bases(observation: Observation, class_name: str, look: Look | None) -> Sought:
-    """The bases of uprights of a class that the network has peaks for. look: the look network for the class, if any."""
-    radius = observation.manifest.radius if look is None else look.contract.upright_radius
-    view = around_bases(observation, radius)
-    return Sought(view, observation.peaks[class_name].apart(view), look)
 
 
 Judged = Mapping[str, tuple[Sought, list[Judgment]]]
@@ -95,7 +101,7 @@ Judged = Mapping[str, tuple[Sought, list[Judgment]]]
 
 def judge_classes(
     observation: Observation,
-    looks: Mapping[str, Look],
+    look: Look | None,
     settings: Settings,
     watch: Stopwatch,
     explain: bool = False,
@@ -103,61 +109,95 @@ def judge_classes(
 ) -> Judged:
     """What is at the peaks of each class that the network has peaks for.
 
-    looks: look networks by class. uprights: also goal posts and robots. explain, watch: see `judge_peaks`. Raises
-    ModelError if a look network does not run.
+    uprights: also goal posts and robots. look, explain, watch: see `judge_peaks`. Raises ModelError if the look network
+    does not run.
     """
-    sought = {}
-    for each in observation.manifest.classes:
-        name = each.name
-        if name in observation.manifest.peaks and each.kind == "object":
-            sought[name] = Sought(observation.view, observation.peaks[name], looks.get(name))
-        elif name in observation.manifest.peaks and uprights and name in UPRIGHTS:
-            sought[name] = sought_bases(observation, name, looks.get(name))
-    judged = judge_peaks(observation, list(sought.values()), settings, watch, explain)
+    contract = None if look is None else look.contract
+    sought = {
+        each.name: Sought.of(observation, each.name, contract)
+        for each in observation.manifest.classes
+        if each.name in observation.manifest.peaks and (each.kind == "object" or (uprights and each.name in UPRIGHTS))
+    }
+    judged = judge_peaks(observation, list(sought.values()), look, settings, watch, explain)
     return {name: (of, found) for (name, of), found in zip(sought.items(), judged, strict=True)}
 
 
 def judge_peaks(
-    observation: Observation, sought: Sequence[Sought], settings: Settings, watch: Stopwatch, explain: bool = False
+    observation: Observation,
+    sought: Sequence[Sought],
+    look: Look | None,
+    settings: Settings,
+    watch: Stopwatch,
+    explain: bool = False,
 ) -> list[list[Judgment]]:
     """The objects of each class at its peaks, most probable first.
 
-    The scores of the peaks, times the look's `mesh_weight`, count in the probabilities, wherever the look moves them.
-    explain: also the rejected ones, with their reasons. watch: gets the stages propose, and with a look look. Raises
-    ModelError if a look network does not run.
+    look: the look network; it judges the classes that have a number. explain: also the rejected ones, with their
+    reasons. watch: gets the stages propose, and with a look look. Raises ModelError if the look network does not run.
     """
-    if not sought:
-        return []
-    pairs = [(each, each.best) for each in sought]
-    centers = [each.view.shape.center_along(peaks.rays, each.view.height) for each, peaks in pairs]
     watch.lap("propose")
-    looks = {number: each.look for number, each in enumerate(sought) if each.look is not None}
-    cut = cut_places(
-        observation.pyramid,
-        [sought[number].view for number in looks],
-        [centers[number] for number in looks],
-        [each.contract for each in looks.values()],
-    )
+    answers: dict[int, tuple[Singles, Floats]] = {}
+    seen = [number for number, each in enumerate(sought) if each.number is not None and len(each.peaks)]
+    if look is not None and seen:
+        answers = dict(zip(seen, _looked(observation, [sought[number] for number in seen], look), strict=True))
     judged = []
-    for number, (each, peaks) in enumerate(pairs):
-        if number in looks:
-            answers, centers[number] = _looked(each.view, looks[number], *cut.pop(0))
-            if weight := looks[number].contract.mesh_weight:
-                answers[:, 0] = probability_of(_log_odds(answers[:, 0]) + weight * peaks.scores)
+    for number, each in enumerate(sought):
+        if number in answers:
+            own, centers = answers[number]
         else:
-            sizes = peaks.log_sizes + math.log(observation.manifest.radius / each.view.shape.radius)
-            answers = np.column_stack([peaks.probabilities, np.zeros((len(peaks), 2)), sizes]).astype(np.float32)
-        judged.append(judged_places(each.view, centers[number], answers, settings, explain))
-    if any(each.look is not None for each in sought):
+            centers = each.view.shape.center_along(each.peaks.rays, each.view.height)
+            sizes = each.peaks.log_sizes + math.log(observation.manifest.radius / each.view.shape.radius)
+            values = [each.peaks.probabilities, np.zeros((len(each.peaks), 2)), sizes]
+            own = np.column_stack(values).astype(np.float32)
+        judged.append(judged_places(each.view, centers, own, settings, explain))
+    if look is not None:
         watch.lap("look")
     return judged
 
 
-def _looked(view: PreparedView, look: Look, patches: Image, tangents: Tangents) -> tuple[Singles, Floats]:
-    """Answers (n, 4) of a look to patches, and the centers (n, 3) [m] of the objects that it saw."""
-    answers = look.run(patches)
+def _looked(observation: Observation, sought: Sequence[Sought], look: Look) -> list[tuple[Singles, Floats]]:
+    """For each class, the answers (n, 4) of a look to its peaks, and the centers (n, 3) [m] of the objects it saw.
+
+    The scores of the peaks, times the class's `mesh_weight`, count in the probabilities, wherever the look moves them.
+    Where the probability is doubtful, the look sees the mirror image of a second patch, around the place that it saw
+    in the first one, and the mean of both answers counts.
+    """
+    counts = [len(each.peaks) for each in sought]
+    of, peaks = np.repeat(np.arange(len(sought)), counts), [each.peaks for each in sought]
+    halves = np.array([each.view.shape.half_size for each in sought])[of]
+    numbers = np.array([each.number for each in sought])[of]
+    weights = np.array([each.mesh_weight for each in look.contract.classes])[numbers]
+    centers = _centers(sought, of, np.concatenate([each.rays for each in peaks]))
+    seen = weights * np.concatenate([each.scores for each in peaks])
+
+    patches, tangents = cut_places(observation.pyramid, observation.view, centers, halves, look.contract)
+    answers = look.run(patches)[np.arange(len(of)), numbers]
     rays = tangents.rays(answers[:, 1].astype(np.float64), answers[:, 2].astype(np.float64))
-    return answers, view.shape.center_along(rays, view.height)
+    odds = _log_odds(answers[:, 0])
+    doubtful = np.flatnonzero(np.abs(odds + seen) < _DOUBTFUL)
+    if len(doubtful):
+        again = _centers(sought, of[doubtful], rays[doubtful])
+        patches, tangents = cut_places(observation.pyramid, observation.view, again, halves[doubtful], look.contract)
+        second = look.run(np.ascontiguousarray(patches[:, :, ::-1]))[np.arange(len(doubtful)), numbers[doubtful]]
+        rays[doubtful] += tangents.rays(-second[:, 1].astype(np.float64), second[:, 2].astype(np.float64))
+        odds[doubtful] = 0.5 * (odds[doubtful] + _log_odds(second[:, 0]))
+        answers[doubtful, 3] = 0.5 * (answers[doubtful, 3] + second[:, 3])
+        rays /= np.sqrt((rays * rays).sum(axis=1))[:, None]
+    answers[:, 0] = probability_of(odds + seen)
+    centers, ends = _centers(sought, of, rays), np.cumsum(counts)
+    parts = [slice(end - count, end) for end, count in zip(ends.tolist(), counts, strict=True)]
+    return [(answers[part], centers[part]) for part in parts]
+
+
+def _centers(sought: Sequence[Sought], of: Chosen, rays: Floats) -> Floats:
+    """Centers (n, 3) [m] along rays (n, 3) of objects of these classes (n,), one after the other."""
+    ends = np.searchsorted(of, np.arange(len(sought) + 1)).tolist()
+    return np.concatenate(
+        [
+            each.view.shape.center_along(rays[start:end], each.view.height)
+            for each, start, end in zip(sought, ends[:-1], ends[1:], strict=True)
+        ]
+    )
 
 
 def _log_odds(probabilities: Singles) -> Floats:

@@ -92,7 +92,7 @@ def _sightings(detector: Detector, camera: str, view: CameraView, plane: Plane) 
         return
     observation = detector.observe(view.image, orientation, view.lens)
     # Not detector.locate, which would also search for features of the field.
-    judged = judge_classes(observation, detector.looks, detector.settings, Stopwatch(), uprights=False)
+    judged = judge_classes(observation, detector.look, detector.settings, Stopwatch(), uprights=False)
     for each in locate(observation, judged, detector.settings, Stopwatch())[0]:
         position = plane.to_world(each.position[None], view.pose)[0]
         away = position - view.pose.position

@@ -8,7 +8,6 @@ paper's constant sample density, one level deeper.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import NamedTuple
@@ -143,35 +142,15 @@ class Cut(NamedTuple):
     tangents: Tangents
 
 
-def cut_places(
-    pyramid: Pyramid, views: Sequence[PreparedView], centers: Sequence[Floats], contracts: Sequence[LookContract]
-) -> list[Cut]:
-    """The patches around places of several classes, as their contracts describe them.
+def cut_places(pyramid: Pyramid, view: PreparedView, centers: Floats, halves: Floats, contract: LookContract) -> Cut:
+    """The patches around places, as a look network takes them.
 
-    Patches of one size are cut at once, which takes half the time. views: of the objects of each class, all of one
-    camera. centers: (k, 3) of each class, relative to the camera in the mesh frame [m].
+    view: of the camera. centers: (k, 3) relative to the camera in the mesh frame [m]. halves (k,): of the longest sides
+    of the objects there [m].
     """
-    if not contracts:
-        return []
-    counts = [len(each) for each in centers]
-    sizes, extents, halves = (
-        np.repeat(each, counts)
-        for each in (
-            [each.size for each in contracts],
-            [each.extent for each in contracts],
-            [view.shape.half_size for view in views],
-        )
-    )
-    tangents = Tangents.around(np.concatenate(centers), halves)
-    nodes = patch_nodes(views[0], tangents, extents)
-    ends = np.cumsum(counts)
-    patches = {size: cut_patches(pyramid, nodes[:, sizes == size], size) for size in {each.size for each in contracts}}
-    found = []
-    for end, count, contract in zip(ends.tolist(), counts, contracts, strict=True):
-        rows = slice(end - count, end)
-        first = int(np.count_nonzero(sizes[: rows.start] == contract.size))
-        found.append(Cut(patches[contract.size][first : first + count], tangents.part(rows)))
-    return found
+    tangents = Tangents.around(centers, halves)
+    nodes = patch_nodes(view, tangents, contract.extent)
+    return Cut(cut_patches(pyramid, nodes, contract.size), tangents)
 
 
 def _rgb(colors: Image, channels: tuple[int, int, int]) -> Image:

@@ -32,7 +32,8 @@ def prove(model: ModelFile) -> str:
     """
     manifest = model.manifest
     parts: dict[str, Manifest | LookContract] = {"mesh network": manifest}
-    parts |= {f"close look at {each.object_class}": each for each in manifest.looks}
+    if manifest.look is not None:
+        parts["close look"] = manifest.look
     for name, part in parts.items():
         if not part.self_test:
             raise ModelError(f"{model.path}: its {name} has no self-test; export it again")

@@ -42,7 +42,7 @@ def with_settings(detector: Detector, detections: Detections, settings: Settings
     run.
     """
     observation, watch = detections.observation, Stopwatch()
-    judged = judge_classes(observation, detector.looks, settings, watch, explain=True, uprights=False)
+    judged = judge_classes(observation, detector.look, settings, watch, explain=True, uprights=False)
     found, rejected = locate(observation, judged, settings, watch, explain=True)
     near = tuple(each for each in rejected if each.confidence >= _WORTH_SHOWING)
     return replace(detections, objects=found, rejected=near, threshold=settings.threshold)

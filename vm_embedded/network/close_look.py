@@ -1,4 +1,4 @@
-"""A look network of a model file, ready to run. It judges each peak of the mesh network."""
+"""The look network of a model file, ready to run. It judges each peak of the mesh network."""
 
 from __future__ import annotations
 
@@ -27,28 +27,30 @@ class CloseLook:
     ) -> None:
         self.contract = contract
         size = contract.size
-        interface = {"patches": ("tensor(uint8)", [size, size, 3]), "answers": ("tensor(float)", [len(ANSWERS)])}
+        self._shape = len(contract.classes), len(ANSWERS)
+        interface = {"patches": ("tensor(uint8)", [size, size, 3]), "answers": ("tensor(float)", [*self._shape])}
         self.onnx = OnnxModel(name, content, interface, "answers", threads, spinning)
         test = contract.self_test
         if test is not None:
             self.onnx.check_answer(self.run(test.all_patches), test.answers, _TOLERANCE)
 
     @classmethod
-    def of(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> dict[str, CloseLook]:
-        """The look networks of a model file, by class. Raises ModelError."""
-        return {
-            each.object_class: cls(f"{model.path}, close look at {each.object_class}", each, file, threads, spinning)
-            for each, file in zip(model.manifest.looks, model.looks, strict=True)
-        }
+    def of(cls, model: ModelFile, threads: int = 1, spinning: bool = False) -> CloseLook | None:
+        """The look network of a model file, None without one. Raises ModelError."""
+        contract = model.manifest.look
+        if contract is None:
+            return None
+        return cls(f"{model.path}, close look", contract, model.look, threads, spinning)
 
     def run(self, patches: Image) -> Singles:
-        """Answers (n, 4) to patches (n, size, size, 3), RGB. Raises ModelError, also for answers that are not finite.
+        """Answers (n, C, 4) to patches (n, size, size, 3), RGB. Raises ModelError, also for NaN and infinite answers.
 
-        A row holds the calibrated probability that an object is in the middle, the shift of its center to the right
-        and down [expected radii], and the logarithm of its apparent radius over the expected one.
+        For each class of the contract, they are the calibrated probability that an object is in the middle, the shift
+        of its center to the right and down [expected radii], and the logarithm of its apparent radius over the expected
+        one.
         """
         if not len(patches):
-            return np.empty((0, len(ANSWERS)), dtype=np.float32)
+            return np.empty((0, *self._shape), dtype=np.float32)
         answers = self.onnx.run({"patches": patches})
         if not np.isfinite(answers).all():
             raise ModelError(f"{self.onnx.path}: its answers are NaN or infinite")

@@ -14,7 +14,7 @@ from ..arrays import Image, Singles
 from ..errors import ModelError
 
 ANSWERS = ("probability", "right", "down", "size")
-"""Outputs of a look network for a patch; see CloseLook.run."""
+"""Outputs of a look network for each class of a patch; see CloseLook.run."""
 
 _MOST_MADE = 1000
 """Most patches that are made for a self-test."""
@@ -22,7 +22,10 @@ _MOST_MADE = 1000
 
 @dataclass(frozen=True, eq=False)
 class LookTest:
-    """Stored patches (k, size, size, 3), RGB, and answers (n, 4) to them and to n - k patches that are made of them."""
+    """Stored patches (k, size, size, 3), RGB, and answers to them and to n - k patches that are made of them.
+
+    answers (n, C, 4): see CloseLook.run.
+    """
 
     patches: Image
     answers: Singles
@@ -43,10 +46,10 @@ class LookTest:
         }
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any], size: int) -> LookTest:
-        """Inverse of `as_dict`, for patches of size x size samples. Raises ModelError."""
+    def from_dict(cls, data: Mapping[str, Any], size: int, classes: int) -> LookTest:
+        """Inverse of `as_dict`, for patches of size x size samples and this number of classes. Raises ModelError."""
         try:
-            answers = np.array(data["answers"], dtype=np.float32).reshape(-1, len(ANSWERS))
+            answers = np.array(data["answers"], dtype=np.float32).reshape(-1, classes, len(ANSWERS))
             content = np.frombuffer(base64.b64decode(data["patches"], validate=True), dtype=np.uint8)
             patches = content.reshape(-1, size, size, 3)
         except (KeyError, TypeError, ValueError, OverflowError) as error:

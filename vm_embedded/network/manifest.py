@@ -22,7 +22,7 @@ from .example import SelfTest
 from .look_contract import LookContract, check_provenance
 
 METADATA_KEY = "visual_mesh"
-FORMAT_VERSION = 8
+FORMAT_VERSION = 9
 
 KINDS = ("object", "upright", "area", "background")
 """Kinds of classes. object: has the mesh's shape; the runtime locates it. upright, area: the runtime reports its points
@@ -49,7 +49,7 @@ PEAK_OUTPUTS = 4
 """Outputs for a class with peaks: score, shift to the right and up, size; see `Manifest.peaks`."""
 
 _SMALLEST_CIRCLE = 0.01
-"""Smallest `upright_radius` of a look at uprights [m]."""
+"""Smallest `upright_radius` of a class of kind upright in the close look [m]."""
 
 
 def _is_number(value: object, kind: type | UnionType = int | float) -> bool:
@@ -96,7 +96,7 @@ class Manifest:
     scale: see `channels`.
     sampling: one of POINT_SAMPLINGS.
     colors: one of POINT_COLORS.
-    looks: descriptions of the look networks for classes with peaks; see close_look.py.
+    look: description of the look network, which judges peaks; see close_look.py. None without one.
     peaks: names of classes of kind object or upright, for which the network also says where objects are; only on mesh
         octaves. After the probabilities of all classes, each of them has four outputs for each cell: the score, a
         logit of whether the place of an object is in the cell; the shift to the right and up from the cell to this
@@ -123,7 +123,7 @@ class Manifest:
     scale: float = 1.0 / 255.0
     sampling: str = "bilinear"
     colors: str = "absolute"
-    looks: tuple[LookContract, ...] = ()
+    look: LookContract | None = None
     peaks: tuple[str, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
 
@@ -147,7 +147,7 @@ class Manifest:
                 raise ModelError(f"{name} in the model's manifest must be a number above 0, not {value!r}")
         self._check_object_height()
         self._check_peaks()
-        self._check_looks()
+        self._check_look()
         if self.mesh == "wall6":
             self._check_walls()
         if not _is_number(self.operations, int) or not 0 <= self.operations <= _LARGEST:
@@ -183,21 +183,21 @@ class Manifest:
                 f"object_height must be above 0 for a cylinder and 0 for other shapes; {self.shape} has {tall:g} m"
             )
 
-    def _check_looks(self) -> None:
-        judged = [each.object_class for each in self.looks]
-        if len(set(judged)) != len(judged) or not set(judged) <= set(self.peaks):
-            raise ModelError(f"there are close looks at {judged}, but the network has peaks for {list(self.peaks)}")
-        kinds = {each.name: each.kind for each in self.classes}
-        for each in self.looks:
-            if kinds[each.object_class] == "object" and each.upright_radius:
+    def _check_look(self) -> None:
+        judged = () if self.look is None else self.look.classes
+        kinds = {each.name: each.kind for each in self.classes if each.name in self.peaks}
+        for each in judged:
+            if each.name not in kinds:
+                raise ModelError(f"a close look judges {each.name!r}, but the network has peaks for {list(self.peaks)}")
+            if kinds[each.name] == "object" and each.upright_radius:
                 raise ModelError(
-                    f"the close look at {each.object_class!r} has an upright_radius of {each.upright_radius:g} m; for "
-                    "a class of kind object it must be 0"
+                    f"the close look has an upright_radius of {each.upright_radius:g} m for {each.name!r}; for a class "
+                    "of kind object it must be 0"
                 )
-            if kinds[each.object_class] == "upright" and each.upright_radius < _SMALLEST_CIRCLE:
+            if kinds[each.name] == "upright" and each.upright_radius < _SMALLEST_CIRCLE:
                 raise ModelError(
-                    f"the close look at {each.object_class!r} must have an upright_radius of at least "
-                    f"{_SMALLEST_CIRCLE} m, not {each.upright_radius:g} m"
+                    f"the close look must have an upright_radius of at least {_SMALLEST_CIRCLE} m for {each.name!r}, "
+                    f"not {each.upright_radius:g} m"
                 )
 
     def _check_walls(self) -> None:
@@ -250,8 +250,9 @@ class Manifest:
 
     @property
     def searched_class(self) -> str | None:
-        """The class of the close look at objects, which also finds them in frames without lens and pose."""
-        return next((each.object_class for each in self.looks if not each.upright_radius), None)
+        """The class of objects that the close look also finds in frames without lens and pose; None without one."""
+        judged = () if self.look is None else self.look.classes
+        return next((each.name for each in judged if not each.upright_radius), None)
 
     @property
     def on_canvas(self) -> bool:
@@ -274,8 +275,8 @@ class Manifest:
 
     def as_json(self) -> str:
         """The manifest as the model file holds it."""
-        data = asdict(replace(self, looks=())) | {"format_version": FORMAT_VERSION}
-        data["looks"] = [each.as_dict() for each in self.looks]
+        data = asdict(replace(self, look=None)) | {"format_version": FORMAT_VERSION}
+        data["look"] = None if self.look is None else self.look.as_dict()
         data["self_test"] = None if self.self_test is None else self.self_test.as_dict()
         return json.dumps(data, sort_keys=True, separators=(",", ":"))
 
@@ -306,11 +307,11 @@ class Manifest:
             data["provenance"] = {str(key): str(value) for key, value in data["provenance"].items()}
         except (TypeError, KeyError, AttributeError) as error:
             raise ModelError(f"the model's manifest has malformed classes or provenance: {error}") from error
-        for name in ("looks", "peaks"):
-            if not isinstance(data[name], list):
-                raise ModelError(f"{name} in the model's manifest must be a list, not {data[name]!r}")
-        data["looks"] = tuple(map(LookContract.from_dict, data["looks"]))
+        if not isinstance(data["peaks"], list):
+            raise ModelError(f"peaks in the model's manifest must be a list, not {data['peaks']!r}")
         data["peaks"] = tuple(data["peaks"])
+        if data["look"] is not None:
+            data["look"] = LookContract.from_dict(data["look"])
         if data["self_test"] is not None:
             data["self_test"] = SelfTest.from_dict(data["self_test"])
         return cls(**data)

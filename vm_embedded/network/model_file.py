@@ -16,7 +16,7 @@ from pathlib import Path
 from ..errors import ModelError
 from ..files import read_regular
 from .canary import CANARY_KEY, Canary
-from .look_contract import look_key
+from .look_contract import LOOK_KEY
 from .manifest import METADATA_KEY, Manifest
 
 # Fields of a message that hold further messages, by the numbers of onnx.proto: every place that can hold a tensor.
@@ -58,14 +58,14 @@ _Budget = Iterator[int]
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file's bytes, its manifest, and the SHA-256 of the bytes. looks: the ONNX files of its close looks, in
-    the manifest's order. canary: None if it has none."""
+    """A model file's bytes, its manifest, and the SHA-256 of the bytes. look: the ONNX file of its close look, empty
+    without one. canary: None if it has none."""
 
     path: Path
     content: bytes
     manifest: Manifest
     sha256: str
-    looks: tuple[bytes, ...] = ()
+    look: bytes = b""
     canary: Canary | None = None
 
 
@@ -97,8 +97,7 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
         if METADATA_KEY not in metadata:
             raise ModelError("no Visual Mesh manifest in its metadata; was it written by vm-export?")
         manifest = Manifest.from_json(metadata[METADATA_KEY])
-        looks = tuple(_look_file(metadata, each.object_class) for each in manifest.looks)
-        _refuse_unknown_looks(metadata, manifest)
+        look = _look_file(metadata, manifest)
         canary = Canary.from_json(metadata[CANARY_KEY]) if CANARY_KEY in metadata else None
         if SEAL_KEY not in metadata:
             raise ModelError("has no checksum: it was written by an older release; export it again with this release")
@@ -107,28 +106,22 @@ def parse_model(path: str | Path, content: bytes) -> ModelFile:
     except ModelError as error:
         raise ModelError(f"{path}: {error}") from error
     sha256 = hashlib.sha256(content).hexdigest()
-    return ModelFile(Path(path), content, manifest, sha256, looks, canary)
+    return ModelFile(Path(path), content, manifest, sha256, look, canary)
 
 
-def _look_file(metadata: dict[str, str], name: str) -> bytes:
-    """The ONNX file of the close look at a class. Raises ModelError."""
-    key = look_key(name)
-    if key not in metadata:
-        raise ModelError(f"its manifest has a close look at {name}, its metadata has none")
+def _look_file(metadata: dict[str, str], manifest: Manifest) -> bytes:
+    """The ONNX file of the close look; empty without one. Raises ModelError."""
+    if (LOOK_KEY in metadata) != (manifest.look is not None):
+        one, other = ("metadata", "manifest") if LOOK_KEY in metadata else ("manifest", "metadata")
+        raise ModelError(f"its {one} has a close look, its {other} has none")
+    if manifest.look is None:
+        return b""
     try:
-        content = base64.b64decode(metadata[key], validate=True)
+        content = base64.b64decode(metadata[LOOK_KEY], validate=True)
         _read_fields(content)
     except (ModelError, ValueError) as error:
-        raise ModelError(f"a close look at {name} can't be read: {error}") from error
+        raise ModelError(f"its close look can't be read: {error}") from error
     return content
-
-
-def _refuse_unknown_looks(metadata: dict[str, str], manifest: Manifest) -> None:
-    """Raises ModelError if there are files of looks that the manifest does not describe."""
-    known = {look_key(each.object_class) for each in manifest.looks}
-    for key in metadata:
-        if key.startswith(look_key("")) and key not in known:
-            raise ModelError(f"its metadata has {key}, its manifest has no such close look")
 
 
 def sealed(content: bytes) -> bytes:

@@ -18,7 +18,6 @@ from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_writable, write_file
 from vm_embedded.network.bundled import DEFAULT, SHIPPED, model_path
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_workstation.contact_sheet import check_sheet_path, write_sheet
 from vm_workstation.option_types import at_least
@@ -108,14 +107,15 @@ def run_check_boxes(options: argparse.Namespace) -> int:
 
 def _unlabeled(found: BoxedSet, network: Path, is_round: bool) -> list[FoundBox]:
     """The objects that the network's close look sees clearly where no box is. Raises ModelError."""
+    from ..tuning.box_finding import searching_look
     from ..tuning.sightings import clear_sightings
 
     if network.suffix.lower() != ".onnx":
         return []
     model = read_model(network)
-    if (name := model.manifest.searched_class) is None:
+    if model.manifest.searched_class is None:
         return []
-    look = CloseLook.of(model)[name]
+    look = searching_look(model)
     bar = ProgressBar(len(found.pictures), "vm-train")
     try:
         sightings = list(clear_sightings(look, found.pictures, is_round, bar.advance))

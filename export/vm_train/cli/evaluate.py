@@ -116,7 +116,7 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
             "max_distance": manifest.max_distance,
             "grid": grid.kind + (f", equal at {grid.equal_at:g} m" if grid.equal_at else ""),
             **{f"provenance {key}": value for key, value in manifest.provenance.items()},
-            **{key: value for each in manifest.looks for key, value in _about_look(each).items()},
+            **({} if manifest.look is None else _about_look(manifest.look)),
         },
         "data": {
             "folders": [str(each) for each in options.data],
@@ -130,10 +130,11 @@ def _about(options: argparse.Namespace, settings: Settings, subject: Subject, co
 
 
 def _about_look(look: LookContract) -> dict[str, Any]:
-    """A close look of a model, for scores.json."""
-    name = f"close look at {look.object_class}"
+    """The close look of a model, for scores.json."""
+    name = f"close look at {', '.join(look.names)}"
     return {
-        name: f"{look.size} x {look.size} samples, extent {look.extent:g} radii, at most {look.max_proposals} peaks",
+        name: f"{look.size} x {look.size} samples, extent {look.extent:g} radii, at most {look.max_proposals} peaks "
+        "of a class",
         f"{name}, channels": list(look.channels),
         **{f"{name}, provenance {key}": value for key, value in look.provenance.items()},
     }

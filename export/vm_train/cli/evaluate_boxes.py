@@ -118,7 +118,8 @@ def _notes(options: argparse.Namespace, models: dict[str, ModelFile], posed: int
         notes.append(f"Only {posed} of the {count} frames have a lens file with a pose, so no frame used it.")
     folder = printable(options.boxes.resolve().name)
     for name, model in models.items():
-        learned = any(each.provenance.get("fine_tuned_on") == folder for each in model.manifest.looks)
+        look = model.manifest.look
+        learned = look is not None and look.provenance.get("fine_tuned_on") == folder
         if options.list is None and learned:
             notes.append(
                 f"{name} learned from frames of a folder {folder}. The pictures.json of its fine-tuning, given with "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,7 +37,7 @@ _CANDIDATES = Settings(min_confidence=0.01)
 _OVERLAP = 0.5
 """IoU of a right answer."""
 
-_MESH_WEIGHTS = (0.0, 0.2, 0.4, 0.6, 0.8)
+_MESH_WEIGHTS = (0.0, 0.4, 0.8, 1.6)
 """Weights of the scores of peaks that are tried beside a close look."""
 
 
@@ -49,7 +49,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
     """
     # Imported here: without torch, help works and the error is one clear line.
     from vm_export.change_model import change_confidence, lost_canary_message
-    from vm_export.look_weights import looks_of
+    from vm_export.look_weights import look_of
 
     from ..evaluation.evaluation import Rules
     from ..evaluation.mask_colors import classes_with_colors, default_colors
@@ -67,22 +67,24 @@ def run_calibrate(options: argparse.Namespace) -> int:
     classes = classes_with_colors(model.manifest, default_colors(path, options.list), options.color)
     rules = Rules(options.radius_of, options.strict)
     job = Job(path, _CANDIDATES, False, classes, rules)
-    tries = _tries(looks_of(model), job, pictures, options.workers)
+    look = look_of(model)
+    tries = _tries(look, job, pictures, options.workers)
     if options.radius_of == "all":
-        for note in other_radii(tries[0][1], model.manifest.object_radius):
+        for note in other_radii(tries[0], model.manifest.object_radius):
             print(f"vm-evaluate: {note}", file=sys.stderr)
-    looks, scores = [], {}
+    scores = {}
     for name in model.manifest.peaks:
-        precisions = [_ranking(result, name).precision_recall.average_precision for _, result in tries]
-        by_class, result = tries[precisions.index(max(precisions)) if name in tries[0][0] else 0]
-        fitted, source = _calibration(name, result)
-        if name in by_class:
-            looks.append(by_class[name].recalibrated(fitted.scale, fitted.offset, source))
+        precisions = [_ranking(result, name).precision_recall.average_precision for result in tries]
+        judged = look is not None and name in look.contract.names
+        best = precisions.index(max(precisions)) if judged else 0
+        fitted, source = _calibration(name, tries[best])
+        if look is not None and judged:
+            look = look.recalibrated(name, fitted.scale, fitted.offset, source, _MESH_WEIGHTS[best])
             for weight, precision in zip(_MESH_WEIGHTS, precisions, strict=True):
                 print(f"{name}: average precision {precision:.4f} with a mesh weight of {weight:g}")
         else:
             scores[name] = fitted.scale, fitted.offset
-    lost_canary = change_confidence(path, options.output, looks, scores)
+    lost_canary = change_confidence(path, options.output, look, scores)
     print(f"{options.output}: written; other objects may now pass --min-confidence")
     if lost_canary:
         print(f"vm-evaluate: {lost_canary_message(options.output, options.model)}", file=sys.stderr)
@@ -99,20 +101,18 @@ def _ranking(result: Evaluation, name: str) -> Ranking:
 
 
 def _tries(
-    looks: Sequence[LookCheckpoint], job: Job, pictures: Sequence[PictureFiles], workers: int | None
-) -> list[tuple[Mapping[str, LookCheckpoint], Evaluation]]:
-    """The look networks by class with each weight of the peaks' scores, and what is found with them."""
+    look: LookCheckpoint | None, job: Job, pictures: Sequence[PictureFiles], workers: int | None
+) -> list[Evaluation]:
+    """What is found with each weight of the peaks' scores; without a look, once."""
     from vm_export.change_model import change_confidence
 
-    found: list[tuple[Mapping[str, LookCheckpoint], Evaluation]] = []
+    found: list[Evaluation] = []
     with tempfile.TemporaryDirectory() as folder:
-        for weight in _MESH_WEIGHTS if looks else (0.0,):
-            weighted = [replace(each, contract=replace(each.contract, mesh_weight=weight)) for each in looks]
+        for weight in (0.0,) if look is None else _MESH_WEIGHTS:
             path = Path(folder) / "weighted.onnx"
-            change_confidence(job.model, path, weighted, {})
+            change_confidence(job.model, path, look and look.weighted(weight), {})
             tried = replace(job, model=path)
-            by_class = {each.contract.object_class: each for each in weighted}
-            found.append((by_class, evaluate_with_progress(tried, tried.subject(), pictures, workers)))
+            found.append(evaluate_with_progress(tried, tried.subject(), pictures, workers))
     return found
 
 

@@ -171,7 +171,7 @@ def _report(training: MeshTraining) -> None:
     if run.configuration.mesh.grid == "hexagonal":  # it can't be exported
         return
     start = run.folder / "start.onnx"
-    if start.exists() and read_model(start).manifest.looks:
+    if start.exists() and read_model(start).manifest.look:
         print(f"next: vm-export {model} --look {start}")
         return
     if "object" in run.configuration.classes.kinds.values():

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -66,7 +66,7 @@ class PictureAnswer:
 
 
 class Subject(Protocol):
-    """A network to evaluate. sha256: of its file. looks: its close looks, by class."""
+    """A network to evaluate. sha256: of its file. look: its close look."""
 
     @property
     def manifest(self) -> Manifest: ...
@@ -75,7 +75,7 @@ class Subject(Protocol):
     @property
     def sha256(self) -> str: ...
     @property
-    def looks(self) -> Mapping[str, CloseLook]: ...
+    def look(self) -> CloseLook | None: ...
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         """Its answer to a picture. radius [m]: of the objects, for the mesh and the fits, if not the manifest's.
@@ -93,7 +93,7 @@ class ExactSubject:
     sha256: str
     settings: Settings
     network: Classifier
-    looks: Mapping[str, CloseLook] = field(default_factory=dict)
+    look: CloseLook | None = None
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         observation = self.observe(picture, radius)
@@ -101,10 +101,10 @@ class ExactSubject:
         features = None
         if self.grid.is_visual:
             is_wanted = self.settings.field_features
-            judged = judge_classes(observation, self.looks, self.settings, Stopwatch(), uprights=is_wanted)
+            judged = judge_classes(observation, self.look, self.settings, Stopwatch(), uprights=is_wanted)
             found, _ = locate(observation, judged, self.settings, Stopwatch())
             features = locate_features(observation, judged) if is_wanted else None
-        return _answer(observation, found, features, self.looks)
+        return _answer(observation, found, features, self.look)
 
     def observe(self, picture: Picture, radius: float | None = None) -> Observation:
         """The points of a picture with their probabilities; see `Subject.answer`."""
@@ -129,27 +129,27 @@ class RobotSubject:
         return self.detector.manifest
 
     @property
-    def looks(self) -> Mapping[str, CloseLook]:
-        return self.detector.looks
+    def look(self) -> CloseLook | None:
+        return self.detector.look
 
     def answer(self, picture: Picture, radius: float | None = None) -> PictureAnswer:
         assert radius is None  # a robot's network is for balls of one size
         seen = self.detector.detect(picture.image, picture.orientation, picture.lens.lens)
-        return _answer(seen.observation, seen.objects, seen.field, self.looks)
+        return _answer(seen.observation, seen.objects, seen.field, self.look)
 
 
 def _answer(
     observation: Observation,
     found: tuple[Detection, ...],
     features: FieldFeatures | None,
-    looks: Mapping[str, CloseLook],
+    look: CloseLook | None,
 ) -> PictureAnswer:
     distances, view = plane_distances(observation.rays, observation.view.height), observation.view
     proposals = {}
-    for each in (look.contract for look in looks.values()):
-        if not each.upright_radius:
-            rays = observation.peaks[each.object_class].rays[: each.max_proposals]
-            proposals[each.object_class] = view.shape.center_along(rays, view.height) @ view.heading.T
+    if look is not None:
+        for name in (each.name for each in look.contract.classes if not each.upright_radius):
+            rays = observation.peaks[name].rays[: look.contract.max_proposals]
+            proposals[name] = view.shape.center_along(rays, view.height) @ view.heading.T
     return PictureAnswer(
         observation.pixels, distances, observation.probabilities, found, proposals, observation.manifest, features
     )
@@ -183,8 +183,8 @@ def load_subject(path: Path, settings: Settings, as_robot: bool = False) -> Subj
         if as_robot:
             return RobotSubject(Detector(model, settings), model.sha256)
         session = Session(model, settings.threads, settings.spinning)
-        looks = CloseLook.of(model, settings.threads, settings.spinning)
-        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, looks)
+        look = CloseLook.of(model, settings.threads, settings.spinning)
+        return ExactSubject(model.manifest, VISUAL, model.sha256, settings, session, look)
     if kind != ".pt":
         raise InputError(f"{path}: a model must be a checkpoint (.pt) or a model file (.onnx), not {path.suffix!r}")
     if as_robot:

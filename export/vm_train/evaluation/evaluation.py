@@ -74,7 +74,8 @@ class Evaluation:
         classes = subject.manifest.classes
         objects = [each.name for each in classes if each.kind == "object" and subject.grid.is_visual]
         scores = {name: ObjectScores(min_radius=MIN_RADIUS) for name in objects}
-        proposals = {name: ProposalScores(MIN_RADIUS) for name in scores if name in subject.looks}
+        judged = () if subject.look is None else subject.look.contract.names
+        proposals = {name: ProposalScores(MIN_RADIUS) for name in scores if name in judged}
         names = {each.name for each in classes}
         features = FieldScores() if subject.grid.is_visual and names.issuperset(CLASSES) else None
         return cls(PointScores([each.name for each in classes]), scores, proposals, features=features)

@@ -13,10 +13,10 @@ import numpy as np
 from vm_embedded.errors import GeometryError, InputError
 
 from .chunks import collect_chunks
-from .labels import OBJECT, UNLABELED, VISIBLE, label_places
+from .labels import OBJECT, UNLABELED, label_places
 from .observing import Observer, RunPicture, items_of
 from .patch_set import PatchChunk, PatchSet
-from .places import jittered_places, proposed_places, random_places
+from .places import PatchPlaces, jittered_places, random_places
 from .run import LookRun
 
 CHUNK = 100
@@ -46,29 +46,34 @@ class Collector:
                     f"{fault}; repair it and continue with vm-train resume {self.run.folder}, or begin again in "
                     "another folder without --strict"
                 ) from error
-            return PatchChunk(PatchSet.empty(self.run.configuration.patches.size), 0, 0, (fault,))
+            none = PatchSet.empty(self.run.configuration.patches.size)
+            return PatchChunk(none, np.zeros((len(self.run.classes), 2), dtype=np.int64), (fault,))
 
     def _collect(self, item: RunPicture) -> PatchChunk:
-        settings, seen = self.run.configuration.patches, self.observer.observe(item.files)
-        observation, truths, view = seen.observation, seen.truths, seen.observation.view
-        places = proposed_places(view, seen.peaks, settings)
-        if not item.validates:
-            random = random_of(settings.seed, item.files.number)
-            places += jittered_places(view, truths, settings, random)
-            places += random_places(observation, settings, random)
-        found = label_places(places.tangents(view), truths)
-        kept = found.labels != UNLABELED
-        places = places.part(kept)
-        patches = PatchSet(
-            places.cut(observation, settings),
-            found.labels[kept],
-            found.targets[kept],
-            np.full(len(places), item.position, dtype=np.int32),
-        )
-        if not item.validates:
-            return PatchChunk(patches)
-        hits = set(found.of[found.labels == OBJECT].tolist())
-        return PatchChunk(patches, int((truths.visible >= VISIBLE).sum()), len(hits), ())
+        settings = self.run.configuration.patches
+        observation, classes = self.observer.observe(item.files)
+        random = random_of(settings.seed, item.files.number)
+        parts, truths = [], np.zeros((len(classes), 2), dtype=np.int64)
+        for kind, seen in enumerate(classes):
+            places = PatchPlaces.of(seen.view.shape.center_along(seen.sought.peaks.rays, seen.view.height))
+            if not item.validates:
+                places += jittered_places(seen.view, seen.truths, settings, random)
+                places += random_places(observation, seen.view, settings, random)
+            found = label_places(places.tangents(seen.view), seen.truths)
+            kept = found.labels != UNLABELED
+            places = places.part(kept)
+            if item.validates:
+                truths[kind] = seen.visible, len(set(found.of[found.labels == OBJECT].tolist()))
+            parts.append(
+                PatchSet(
+                    places.cut(observation.pyramid, seen.view, settings),
+                    found.labels[kept],
+                    found.targets[kept],
+                    np.full(len(places), kind, dtype=np.int8),
+                    np.full(len(places), item.position, dtype=np.int32),
+                )
+            )
+        return PatchChunk(PatchSet.joined(settings.size, parts), truths)
 
 
 def collect_patches(run: LookRun, workers: int, report: Callable[[int], None]) -> list[Path]:

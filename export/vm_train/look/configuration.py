@@ -6,7 +6,7 @@ import dataclasses
 from dataclasses import Field, dataclass
 from typing import TYPE_CHECKING, Any
 
-from vm_embedded.config.entries import check_entries, entry, number, one_of, share, text_line
+from vm_embedded.config.entries import check_entries, entry, number, one_of, share
 from vm_embedded.errors import InputError
 from vm_workstation.ranges import range_of
 
@@ -37,13 +37,8 @@ class LookData:
 class PatchSettings:
     """Section [patches]: which patches the network learns from, and how it gets them on the robot."""
 
-    object_class: str = text_line(
-        "",
-        "class to judge: of kind object, or goal or robot of kind upright; "
-        '"": the first class of kind object that MODEL has',
-    )
     upright_radius: float = number(
-        0.3,
+        0.4,
         "for goal and robot, the radius of a circle around the base on the plane, which takes the place of the "
         "object's radius",
         "m",
@@ -57,9 +52,11 @@ class PatchSettings:
         (0.5, 8.0),
     )
     max_proposals: int = number(
-        10, "largest number of peaks that it judges in a picture, here and on the robot", "", (1, 128)
+        10, "largest number of peaks of each class that it judges in a picture, here and on the robot", "", (1, 128)
     )
-    jittered: int = number(6, "patches beside true objects in a training picture with objects", "", (0, 1000))
+    jittered: int = number(
+        6, "patches beside true objects of each class in a training picture that has some", "", (0, 1000)
+    )
     jitter: float = number(0.9, "largest distance of these from the true center", "apparent radii", (0.0, 1.0))
     size_jitter: float = number(
         0.2,
@@ -68,7 +65,7 @@ class PatchSettings:
         "",
         (0.0, 0.5),
     )
-    random: int = number(4, "patches at random places on the plane in a training picture", "", (0, 1000))
+    random: int = number(4, "patches of each class at random places on the plane in a training picture", "", (0, 1000))
     seed: int = number(0, "seed of the jittered and random places", "", (0, 2**31))
 
     def __post_init__(self) -> None:
@@ -179,9 +176,8 @@ class LookConfiguration:
     training: LookRecipe = dataclasses.field(default_factory=LookRecipe)
     augmentation: PatchAugmentation = dataclasses.field(default_factory=PatchAugmentation)
 
-    @property
-    def shape(self) -> LookShape:
-        """The layers of the network."""
+    def shape(self, classes: int) -> LookShape:
+        """The layers of a network for this number of classes. Raises InputError."""
         from vm_export.look_network import LookShape  # torch takes a second to load
 
-        return LookShape(self.patches.size, self.network.channels, self.network.hidden)
+        return LookShape(self.patches.size, self.network.channels, self.network.hidden, classes)

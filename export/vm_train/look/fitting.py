@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from vm_embedded.detection.settings import Settings
-from vm_embedded.errors import InputError, unknown
+from vm_embedded.errors import InputError
 from vm_embedded.field.features import UPRIGHTS
 
 from ..evaluation.answers import ExactSubject, load_subject
@@ -24,19 +24,20 @@ def load_mesh(path: Path) -> ExactSubject:
     return subject
 
 
-def class_to_judge(configuration: LookConfiguration, subject: ExactSubject, model: str) -> str:
-    """The class that the look network judges. Raises InputError if model or masks do not have it."""
-    kinds = {each.name: each.kind for each in subject.manifest.classes if each.name in subject.manifest.peaks}
-    name = configuration.patches.object_class or min(kinds, key=lambda each: kinds[each] != "object")
-    if name not in kinds:
-        raise InputError(f"[patches] object_class: {unknown(f'class with peaks of {model}', name, list(kinds))}")
-    in_masks = [each for each, kind in configuration.classes.kinds.items() if kind == kinds[name]]
-    if name not in in_masks:
-        raise InputError(
-            f"{model} has class {name!r}, but those of the kind {kinds[name]} in [classes] are "
-            f"{', '.join(in_masks) or 'none'}: give the class and its colors in masks there"
-        )
-    missing = [each for each in CLASSES if each not in configuration.classes.kinds]
-    if name in UPRIGHTS and missing:
-        raise InputError(f"the truth about a {name} needs the classes {', '.join(missing)}: add them to [classes]")
-    return name
+def classes_to_judge(configuration: LookConfiguration, subject: ExactSubject, model: str) -> tuple[str, ...]:
+    """The classes that the look network judges: all that the mesh network has peaks for.
+
+    Raises InputError if the masks lack one.
+    """
+    kinds = {each.name: each.kind for each in subject.manifest.classes}
+    for name in subject.manifest.peaks:
+        in_masks = [each for each, kind in configuration.classes.kinds.items() if kind == kinds[name]]
+        if name not in in_masks:
+            raise InputError(
+                f"{model} has class {name!r}, but those of the kind {kinds[name]} in [classes] are "
+                f"{', '.join(in_masks) or 'none'}: give the class and its colors in masks there"
+            )
+        missing = [each for each in CLASSES if each not in configuration.classes.kinds]
+        if name in UPRIGHTS and missing:
+            raise InputError(f"the truth about a {name} needs the classes {', '.join(missing)}: add them to [classes]")
+    return subject.manifest.peaks

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from vm_embedded.detection.looking import around_bases
+from vm_embedded.detection.looking import Sought
 from vm_embedded.detection.observation import Observation
-from vm_embedded.detection.peaks import Peaks
+from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import UPRIGHTS
+from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.manifest import Manifest
 
 from ..data.classes import Classes
@@ -17,7 +18,7 @@ from ..data.pictures import find_pictures, read_picture
 from ..evaluation.answers import ExactSubject
 from ..truth.field import read_field
 from ..truth.objects import SceneTruth, read_scene
-from .labels import Truths, find_truths, true_bases
+from .labels import VISIBLE, Truths, find_truths, true_bases
 from .run import LookRun
 
 
@@ -45,50 +46,61 @@ def items_of(run: LookRun) -> list[RunPicture]:
 
 @dataclass(frozen=True, eq=False)
 class Observed:
-    """A picture after the mesh network: the peaks of the judged class, and the true objects."""
+    """A class in a picture after the mesh network: what is sought at its peaks, and the true objects."""
 
-    observation: Observation
-    peaks: Peaks
+    sought: Sought
     truths: Truths
+
+    @property
+    def view(self) -> PreparedView:
+        """The view of objects of the class."""
+        return self.sought.view
+
+    @property
+    def visible(self) -> int:
+        """Number of the true objects of which enough is visible to find them."""
+        return int((self.truths.visible >= VISIBLE).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class Observer:
     """The mesh network of a run.
 
-    classes: colors in masks. in_masks: a manifest with the classes of the masks. upright_radius: of the circles
-    around bases [m], for a class of kind upright. kind: of uprights, None for objects.
+    look: what it is for. classes: colors in masks. in_masks: a manifest with the classes of the masks.
     """
 
     subject: ExactSubject
+    look: LookContract
     classes: Classes
     in_masks: Manifest
-    object_class: str
-    upright_radius: float
-    kind: str | None
 
     @classmethod
     def of(cls, run: LookRun) -> Observer:
         """Read the mesh network. Raises InputError or ModelError."""
         subject, table = run.subject(), run.configuration.classes
-        in_masks = replace(subject.manifest, classes=table.outputs, looks=(), peaks=(), self_test=None)
-        name = run.object_class
-        kinds = {each.name: each.kind for each in subject.manifest.classes}
-        kind = UPRIGHTS[name] if kinds[name] == "upright" else None
-        return cls(subject, table.mask_classes(), in_masks, name, run.upright_radius, kind)
+        in_masks = replace(subject.manifest, classes=table.outputs, look=None, peaks=(), self_test=None)
+        return cls(subject, run.contract, table.mask_classes(), in_masks)
 
-    def observe(self, files: PictureFiles) -> Observed:
-        """Raises InputError or GeometryError for a picture that can't be used."""
-        picture = read_picture(files, self.classes)
-        scene = read_scene(files.scene)
+    def observe(self, files: PictureFiles) -> tuple[Observation, list[Observed]]:
+        """A picture after the mesh network, and each class of the look in it.
+
+        Raises InputError or GeometryError for a picture that can't be used.
+        """
+        picture, scene = read_picture(files, self.classes), read_scene(files.scene)
         observation = self.subject.observe(picture, self._radius(scene))
-        manifest, peaks = observation.manifest, observation.peaks[self.object_class]
-        if self.kind is not None:
-            view = around_bases(observation, self.upright_radius)
-            truths = true_bases(picture, read_field(files.scene), self.classes.names, view, self.kind)
-            return Observed(replace(observation, view=view), peaks.apart(view), truths)
-        in_masks = replace(self.in_masks, radius=manifest.radius, object_radius=manifest.object_radius)
-        return Observed(observation, peaks, find_truths(picture, scene, in_masks, observation.view, self.object_class))
+        field = None if all(not each.upright_radius for each in self.look.classes) else read_field(files.scene)
+        in_masks = replace(
+            self.in_masks, radius=observation.manifest.radius, object_radius=observation.manifest.object_radius
+        )
+        seen = []
+        for each in self.look.classes:
+            sought = Sought.of(observation, each.name, self.look)
+            if each.upright_radius:
+                truths = true_bases(picture, field, self.classes.names, sought.view, UPRIGHTS[each.name])
+            else:
+                truths = find_truths(picture, scene, in_masks, sought.view, each.name)
+            seen.append(Observed(sought, truths))
+        return observation, seen
 
     def _radius(self, scene: SceneTruth | None) -> float | None:
         """Radius of the objects to look for [m]: that of the scene, if the mesh network is for any radius."""

@@ -18,18 +18,22 @@ from vm_embedded.files import atomic_write
 from ..data.array_files import read_arrays
 from .labels import OBJECT
 
+_NAMES = ("patches", "labels", "targets", "kinds", "pictures")
+"""Arrays of a set, in order."""
+
 
 @dataclass(frozen=True, eq=False)
 class PatchSet:
     """n labeled patches.
 
-    patches (n, size, size, 3): RGB. labels (n,): NOTHING or OBJECT. targets (n, 3): see PlaceLabels. pictures (n,):
-    positions of their pictures in the run's list.
+    patches (n, size, size, 3): RGB. labels (n,): NOTHING or OBJECT. targets (n, 3): see PlaceLabels. kinds (n,):
+    number of the class that these are about. pictures (n,): positions of their pictures in the run's list.
     """
 
     patches: Image
     labels: npt.NDArray[np.int8]
     targets: Singles
+    kinds: npt.NDArray[np.int8]
     pictures: npt.NDArray[np.int32]
 
     def __len__(self) -> int:
@@ -42,12 +46,12 @@ class PatchSet:
 
     def part(self, chosen: npt.NDArray[Any]) -> PatchSet:
         """The patches of a mask (n,), or with these positions."""
-        return PatchSet(*(each[chosen] for each in self._arrays()))
+        return PatchSet(*(each[chosen] for each in self.arrays()))
 
     def sha256(self) -> str:
         """Digest of everything in the set."""
         digest = hashlib.sha256()
-        for each in self._arrays():
+        for each in self.arrays():
             digest.update(np.ascontiguousarray(each).data)
         return digest.hexdigest()
 
@@ -58,13 +62,14 @@ class PatchSet:
             np.empty((count, size, size, 3), dtype=np.uint8),
             np.zeros(count, dtype=np.int8),
             np.zeros((count, 3), dtype=np.float32),
+            np.zeros(count, dtype=np.int8),
             np.zeros(count, dtype=np.int32),
         )
 
     def write(self, start: int, other: PatchSet) -> int:
         """Replace the patches from position `start` on by those of another set. Returns the position after them."""
         end = start + len(other)
-        for target, source in zip(self._arrays(), other._arrays(), strict=True):
+        for target, source in zip(self.arrays(), other.arrays(), strict=True):
             target[start:end] = source
         return end
 
@@ -77,21 +82,21 @@ class PatchSet:
             start = made.write(start, each)
         return made
 
-    def _arrays(self) -> tuple[npt.NDArray[Any], ...]:
-        return self.patches, self.labels, self.targets, self.pictures
+    def arrays(self) -> tuple[npt.NDArray[Any], ...]:
+        """All arrays, in the order of the fields."""
+        return self.patches, self.labels, self.targets, self.kinds, self.pictures
 
 
 @dataclass(frozen=True, eq=False)
 class PatchChunk:
     """What was collected from some pictures.
 
-    objects: number of visible true objects in them; proposed: number of these that some proposal is at; both for
-    validation pictures only. faults: the reason for each picture that can't be used.
+    truths (C, 2): for each class, the number of visible true objects in validation pictures, and of these that some
+    proposal is at. faults: the reason for each picture that can't be used.
     """
 
     patches: PatchSet
-    objects: int = 0
-    proposed: int = 0
+    truths: npt.NDArray[np.int64]
     faults: tuple[str, ...] = ()
 
     @classmethod
@@ -99,33 +104,24 @@ class PatchChunk:
         """All of several chunks, at least one, in order."""
         return cls(
             PatchSet.joined(parts[0].patches.patches.shape[1], [each.patches for each in parts]),
-            sum(each.objects for each in parts),
-            sum(each.proposed for each in parts),
+            np.sum([each.truths for each in parts], axis=0),
             tuple(fault for each in parts for fault in each.faults),
         )
 
     def save(self, path: Path) -> None:
         """Write the chunk. Raises InputError if it can't be written."""
-        patches = self.patches
+        arrays: dict[str, Any] = dict(zip(_NAMES, self.patches.arrays(), strict=True))
+        arrays |= {"truths": self.truths, "faults": np.array(self.faults, dtype=np.str_)}
         with atomic_write(path) as part, part.open("wb") as file:
-            np.savez(
-                file,
-                patches=patches.patches,
-                labels=patches.labels,
-                targets=patches.targets,
-                pictures=patches.pictures,
-                truths=np.array([self.objects, self.proposed], dtype=np.int64),
-                faults=np.array(self.faults, dtype=np.str_),
-            )
+            np.savez(file, **arrays)
 
     @classmethod
     def load(cls, path: Path) -> PatchChunk:
         """Read a chunk. Raises InputError naming the file."""
         try:
             file = read_arrays(path)
-            objects, proposed = file["truths"].tolist()
-            arrays = (file[name] for name in ("patches", "labels", "targets", "pictures"))
-            return cls(PatchSet(*arrays), objects, proposed, tuple(map(str, file["faults"])))
+            truths = file["truths"].reshape(-1, 2)
+            return cls(PatchSet(*(file[name] for name in _NAMES)), truths, tuple(map(str, file["faults"])))
         except InputError as error:
             raise InputError(f"{error}; remove it and resume the training") from error
         except (ValueError, KeyError, TypeError) as error:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.detection.observation import Observation
 from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes
-from vm_embedded.detection.peaks import Peaks
 from vm_embedded.detection.prepared_view import PreparedView
+from vm_embedded.detection.pyramid import Pyramid
 
 from .configuration import PatchSettings
 from .labels import VISIBLE, Truths
@@ -48,15 +48,9 @@ class PatchPlaces:
         found = Tangents.at(view, self.centers)
         return replace(found, radius=found.radius * self.factors)
 
-    def cut(self, observation: Observation, settings: PatchSettings) -> Image:
+    def cut(self, pyramid: Pyramid, view: PreparedView, settings: PatchSettings) -> Image:
         """Their patches (n, size, size, 3), RGB."""
-        nodes = patch_nodes(observation.view, self.tangents(observation.view), settings.extent)
-        return cut_patches(observation.pyramid, nodes, settings.size)
-
-
-def proposed_places(view: PreparedView, peaks: Peaks, settings: PatchSettings) -> PatchPlaces:
-    """The peaks that a look judges, best first."""
-    return PatchPlaces.of(view.shape.center_along(peaks.rays[: settings.max_proposals], view.height))
+        return cut_patches(pyramid, patch_nodes(view, self.tangents(view), settings.extent), settings.size)
 
 
 def jittered_places(
@@ -76,9 +70,10 @@ def jittered_places(
     return PatchPlaces(view.shape.center_along(rays[below], view.height), factors[below])
 
 
-def random_places(observation: Observation, settings: PatchSettings, random: np.random.Generator) -> PatchPlaces:
-    """Places on the plane at random pixels of the picture, as far as the mesh reaches."""
-    view = observation.view
+def random_places(
+    observation: Observation, view: PreparedView, settings: PatchSettings, random: np.random.Generator
+) -> PatchPlaces:
+    """Places on the plane at random pixels of the picture, as far as the mesh reaches. view: of the objects there."""
     pixels = random.random((_DRAWS * settings.random, 2)) * view.size - 0.5
     rays = view.lens.unproject(pixels, view.size) @ view.rotation.T
     rays = rays[np.isfinite(rays).all(axis=1)]

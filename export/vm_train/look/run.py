@@ -13,13 +13,14 @@ from pathlib import Path
 
 from vm_embedded.config.sections import read_sections
 from vm_embedded.files import read_bytes, write_file
+from vm_embedded.network.look_contract import JudgedClass, LookContract
 from vm_embedded.output.result_files import make_folder
 
 from ..data.split import Split, read_split, write_split
 from ..evaluation.answers import ExactSubject
 from ..runs.run import Run, check_unused, description, write_run
 from .configuration import LookConfiguration
-from .fitting import class_to_judge, load_mesh
+from .fitting import classes_to_judge, load_mesh
 
 _FILES = ("look.toml", "mesh.onnx", "mesh.pt", "patches", "look.pt", "result.json")
 """Files that a new training would overwrite, besides those of all trainings."""
@@ -30,8 +31,8 @@ class LookRun(Run):
     """A training as its folder describes it; `begin_look_run` and `read_look_run` make it.
 
     split: numbers of the pictures of each part. data: folder of the pictures. mesh: the copy of the mesh network.
-    model: that network as the user named it. object_class: class to judge. strict: whether a picture that can't be used
-    ends the training.
+    model: that network as the user named it. classes: names of those to judge. strict: whether a picture that can't be
+    used ends the training.
     """
 
     split: Split
@@ -39,7 +40,7 @@ class LookRun(Run):
     configuration: LookConfiguration
     mesh: Path
     model: str
-    object_class: str
+    classes: tuple[str, ...]
     strict: bool
 
     @property
@@ -62,10 +63,17 @@ class LookRun(Run):
         return load_mesh(self.mesh)
 
     @property
-    def upright_radius(self) -> float:
-        """Radius of the circles around bases [m]; 0 for a class of kind object."""
-        is_upright = self.configuration.classes.kinds[self.object_class] == "upright"
-        return self.configuration.patches.upright_radius if is_upright else 0.0
+    def contract(self) -> LookContract:
+        """The contract of the network, without provenance."""
+        patches, kinds = self.configuration.patches, self.configuration.classes.kinds
+        radii = {name: patches.upright_radius if kinds[name] == "upright" else 0.0 for name in self.classes}
+        return LookContract(
+            classes=tuple(JudgedClass(name=name, upright_radius=radius) for name, radius in radii.items()),
+            size=patches.size,
+            extent=patches.extent,
+            max_proposals=patches.max_proposals,
+            channels=self.configuration.network.channels,
+        )
 
 
 def begin_look_run(
@@ -84,8 +92,8 @@ def begin_look_run(
     Raises InputError, also if the folder holds a training, and ModelError.
     """
     check_unused(folder, _FILES)
-    _ = configuration.shape
-    object_class = class_to_judge(configuration, load_mesh(model), name)
+    classes = classes_to_judge(configuration, load_mesh(model), name)
+    _ = configuration.shape(len(classes))
     make_folder(folder / "patches")
     write_split(folder / "pictures.json", split)
     mesh = f"mesh{model.suffix.lower()}"
@@ -94,7 +102,7 @@ def begin_look_run(
         "data": str(data.resolve()),
         "mesh": mesh,
         "model": name,
-        "object_class": object_class,
+        "classes": list(classes),
         "strict": strict,
         "threads": threads,
     }
@@ -117,6 +125,6 @@ def read_look_run(folder: Path, moved_to: Path | None = None) -> LookRun:
             configuration=read_sections(LookConfiguration, folder / "look.toml"),
             mesh=folder / str(content["mesh"]),
             model=str(content["model"]),
-            object_class=str(content["object_class"]),
+            classes=tuple(map(str, content["classes"])),
             strict=bool(content["strict"]),
         )

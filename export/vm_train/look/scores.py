@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from vm_embedded.arrays import Floats, Image, Mask, Singles
+from vm_embedded.arrays import Floats, Mask, Singles
 from vm_export.look_network import LookNetwork
 
 from ..scores.calibration import Calibration
@@ -24,14 +24,16 @@ _REPORTED = 0.5
 
 
 @torch.no_grad()
-def logits_of(network: LookNetwork, patches: Image) -> Singles:
-    """Outputs (n, 4) of a network for patches: logit, right, down and log size."""
-    device = network.calibration.device
+def logits_of(network: LookNetwork, patches: PatchSet) -> Singles:
+    """Outputs (n, 4) of a network for patches, each about the class of the patch: logit, right, down and log size."""
+    device, images = network.calibration.device, patches.patches
     parts = [
-        network.logits(torch.from_numpy(patches[start : start + _BATCH]).to(device)).cpu().numpy()
-        for start in range(0, len(patches), _BATCH)
+        network.logits(torch.from_numpy(images[start : start + _BATCH]).to(device)).cpu().numpy()
+        for start in range(0, len(images), _BATCH)
     ]
-    return np.concatenate(parts) if parts else np.empty((0, 4), dtype=np.float32)
+    if not parts:
+        return np.empty((0, 4), dtype=np.float32)
+    return np.asarray(np.concatenate(parts)[np.arange(len(patches)), patches.kinds])
 
 
 @dataclass(frozen=True)

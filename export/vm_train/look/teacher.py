@@ -17,14 +17,16 @@ class LookTeacher:
     shares: torch.Tensor
 
     @torch.no_grad()
-    def presence(self, chosen: torch.Tensor, patches: torch.Tensor, shown: torch.Tensor) -> torch.Tensor:
+    def presence(
+        self, chosen: torch.Tensor, patches: torch.Tensor, kinds: torch.Tensor, shown: torch.Tensor
+    ) -> torch.Tensor:
         """The targets (k,) for training patches with these positions (k,), after augmentation: (k, size, size, 3).
 
-        shown (k,): whether each shows an object, 1 or 0.
+        kinds (k,): number of the class of each. shown (k,): whether each shows an object, 1 or 0.
         """
         shares = self.shares[chosen]
         taught = torch.flatten(shares.nonzero())
         wanted = shown.clone()
-        answers = torch.sigmoid(self.network.logits(patches[taught])[:, 0])
+        answers = torch.sigmoid(self.network.logits(patches[taught])[torch.arange(len(taught)), kinds[taught], 0])
         wanted[taught] = torch.lerp(shown[taught], answers, shares[taught])
         return wanted

@@ -16,7 +16,7 @@ class TorchLook:
         self._network, self.contract = network.eval(), contract
 
     def run(self, patches: Image) -> Singles:
-        """Answers (n, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them.
+        """Answers (n, C, 4) to patches (n, size, size, 3), as `CloseLook.run` gives them.
 
         It takes one thread, because another number changes the last digits.
         """

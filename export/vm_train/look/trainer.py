@@ -31,8 +31,10 @@ class LookTrainer(Learner[LookNetwork]):
     """A network that is trained for `total` steps on patches.
 
     extent: half the side of a patch [expected radii]. weights (n,): how often each patch is drawn, compared to others
-    of its kind; None: equally often. teacher: gives the target of some patches' presence. device: "cpu" or "cuda:0", as
-    torch names it. Raises InputError if no patch shows an object, or all do."""
+    with, or without, an object; None: so that each class comes equally often. teacher: gives the target of some
+    patches' presence. device: "cpu" or "cuda:0", as torch names it. Raises InputError if no patch shows an object, or
+    all do.
+    """
 
     def __init__(
         self,
@@ -52,27 +54,26 @@ class LookTrainer(Learner[LookNetwork]):
         )
         self.recipe, self._augmentation, self._patches, self._extent = recipe, augmentation, patches, extent
         self._images, self._targets = torch.from_numpy(patches.patches), torch.from_numpy(patches.targets)
+        self._kinds = torch.from_numpy(patches.kinds.astype(np.int64))
         self._with, self._without = (np.flatnonzero((patches.labels == OBJECT) == each) for each in (True, False))
         for chosen, what in ((self._with, "shows an object"), (self._without, "shows no object")):
             if not len(chosen):
                 raise InputError(f"none of the {len(patches)} training patches {what}")
         self._errors: npt.NDArray[np.float32] | None = None
-        self._weights, self._teacher = weights, teacher
-        self._shown_chances, self._chances = (
-            None if weights is None else np.cumsum(weights[rows]) for rows in (self._with, self._without)
-        )
+        self._weights, self._teacher = _by_class(patches) if weights is None else weights, teacher
+        self._shown_chances, self._chances = (np.cumsum(self._weights[rows]) for rows in (self._with, self._without))
 
     def grade(self) -> None:
         """Draw patches without an object by the network's errors from now on."""
         self.network.eval()
-        logits = logits_of(self.network, self._patches.patches[self._without])[:, 0]
+        logits = logits_of(self.network, self._patches.part(self._without))[:, 0]
         self.network.train()
         self._set_errors(0.5 + 0.5 * np.tanh(0.5 * logits))
 
     def _set_errors(self, errors: npt.NDArray[np.float32]) -> None:
         self._errors = errors
         chances = errors.astype(np.float64) + self.recipe.floor
-        self._chances = np.cumsum(chances if self._weights is None else chances * self._weights[self._without])
+        self._chances = np.cumsum(chances * self._weights[self._without])
 
     def step(self) -> dict[str, float]:
         """Learn from one batch. Raises DivergedError if the loss is NaN or infinite.
@@ -85,8 +86,9 @@ class LookTrainer(Learner[LookNetwork]):
         images, targets = self._images[chosen].to(self._device), self._targets[chosen].to(self._device)
         patches, targets = augment(images, targets, self._extent, self._augmentation, random)
         shown = shown.to(self._device)
-        answers = self.network.logits(patches)
-        wanted = shown if self._teacher is None else self._teacher.presence(chosen, patches, shown)
+        kinds = self._kinds[chosen].to(self._device)
+        answers = self.network.logits(patches)[torch.arange(len(kinds)), kinds]
+        wanted = shown if self._teacher is None else self._teacher.presence(chosen, patches, kinds, shown)
         presence = functional.binary_cross_entropy_with_logits(answers[:, 0], wanted)
         errors = functional.smooth_l1_loss(answers[:, 1:], targets, reduction="none", beta=_PRECISE).sum(dim=1)
         place = (errors * shown).sum() / shown.sum()
@@ -115,12 +117,20 @@ class LookTrainer(Learner[LookNetwork]):
             self._set_errors(state["errors"].numpy())
 
 
+def _by_class(patches: PatchSet) -> Floats:
+    """Weights (n,) of patches, with which each class comes as often as any other, with and without an object."""
+    weights = np.empty(len(patches))
+    for kind in np.unique(patches.kinds):
+        for shows in (True, False):
+            rows = (patches.kinds == kind) & ((patches.labels == OBJECT) == shows)
+            weights[rows] = 1.0 / max(int(rows.sum()), 1)
+    return weights
+
+
 def _drawn(
-    rows: npt.NDArray[np.intp], chances: Floats | None, count: int, random: np.random.Generator
+    rows: npt.NDArray[np.intp], chances: Floats, count: int, random: np.random.Generator
 ) -> npt.NDArray[np.intp]:
-    """`count` of n rows, with repetitions. chances (n,): sums of their chances so far; None: all have the same."""
-    if chances is None:
-        return np.asarray(rows[random.integers(len(rows), size=count)])
+    """`count` of n rows, with repetitions. chances (n,): sums of their chances so far."""
     drawn = np.searchsorted(chances, random.random(count) * chances[-1], side="right")
     return np.asarray(rows[np.minimum(drawn, len(rows) - 1)])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from vm_embedded import __version__
 from vm_embedded.arrays import Image, Singles
 from vm_embedded.borders.text import printable
 from vm_embedded.files import write_file
-from vm_embedded.network.look_contract import LookContract
 from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork
@@ -33,7 +32,7 @@ from .training_patches import TrainingPatches, collect
 from .validation import judge_validation
 
 _EXAMPLES = 2
-"""Patches with an object, and as many without, for the self-test of the model file."""
+"""Patches of each class with an object, and as many without, for the self-test of the model file."""
 
 
 class LookTraining(Training):
@@ -54,7 +53,8 @@ class LookTraining(Training):
         self._describe()
         self.steps = -(-len(self._patches.training) // recipe.batch)
         torch.manual_seed(recipe.seed)
-        network, extent = LookNetwork(configuration.shape), configuration.patches.extent
+        shape, extent = configuration.shape(len(self.run.classes)), configuration.patches.extent
+        network = LookNetwork(shape)
         augmentation, device = configuration.augmentation, self._hardware.device
         total = recipe.epochs * self.steps
         self.learner = LookTrainer(network, self._patches.training, extent, recipe, augmentation, total, device=device)
@@ -68,59 +68,60 @@ class LookTraining(Training):
 
     def validate(self) -> Validation:
         """Score the network on the proposals in the validation pictures."""
-        score = LookScore.of(self._answers(), self._patches.validation)
-        return Validation(asdict(score), *_in_words(score))
+        scores = self._scores(self._answers())
+        record = {f"{name} {key}": value for name, each in scores.items() for key, value in asdict(each).items()}
+        return Validation(record, *_in_words(scores))
 
     def finish(self) -> None:
         """Calibrate the network on what it finds in the validation pictures; write look.pt."""
-        run, network, contract = self.run, self.learner.network.cpu().eval(), self._contract()
+        run, network, contract = self.run, self.learner.network.cpu().eval(), self.run.contract
         round_kernels(network)
         with shown(len(run.split.validation), self._stopped) as report:
             found = judge_validation(run, network, contract, self._hardware.workers, report)
-        calibration = Calibration.fit(found.confidence, found.right)
-        result = replace(found, confidence=calibration.probabilities(found.confidence))
         logits = self._answers()
-        score = LookScore.of(logits, self._patches.validation)
-        contract = replace(contract, provenance=self._provenance(score, result))
-        examples = _examples(self._patches.validation, logits[:, 0])
-        look = LookCheckpoint(network, contract, examples)
+        look = LookCheckpoint(network, contract, _examples(self._patches.validation, logits[:, 0]))
         source = f"{len(run.split.validation)} validation pictures of {printable(run.data.name)}"
-        look.recalibrated(calibration.scale, calibration.offset, source).save(run.result_path)
-        write_file(run.folder / "result.json", json.dumps(result_values(result, calibration), indent=1) + "\n")
-        print(f"{run.result_path}: {result_in_words(result)}")
+        results, values = {}, {}
+        for name, each in zip(run.classes, found, strict=True):
+            calibration = Calibration.fit(each.confidence, each.right)
+            results[name] = replace(each, confidence=calibration.probabilities(each.confidence))
+            values[name] = result_values(results[name], calibration)
+            look = look.recalibrated(name, calibration.scale, calibration.offset, source)
+        provenance = self._provenance(self._scores(logits), results) | dict(look.contract.provenance)
+        replace(look, contract=replace(look.contract, provenance=provenance)).save(run.result_path)
+        write_file(run.folder / "result.json", json.dumps(values, indent=1) + "\n")
+        for name, result in results.items():
+            print(f"{run.result_path}, {name}: {result_in_words(result)}")
 
     def _answers(self) -> Singles:
         """Outputs (n, 4) for the patches of the validation. Raises DivergedError if some are NaN or infinite."""
         network, training = self.learner.network, self.learner.network.training
-        logits = logits_of(network.eval(), self._patches.validation.patches)
+        logits = logits_of(network.eval(), self._patches.validation)
         network.train(training)
         if not np.isfinite(logits).all():
             raise DivergedError("the network's answers are NaN or infinite: begin again with a lower training.rate")
         return logits
 
+    def _scores(self, logits: Singles) -> dict[str, LookScore]:
+        """The scores of outputs (n, 4) for the patches of the validation, by class."""
+        patches = self._patches.validation
+        rows = {name: np.flatnonzero(patches.kinds == kind) for kind, name in enumerate(self.run.classes)}
+        return {name: LookScore.of(logits[each], patches.part(each)) for name, each in rows.items()}
+
     def _describe(self) -> None:
         """Print what was collected."""
-        found, name = self._patches, self.run.object_class
-        training, validation = found.training, found.validation
-        print(f"training: {len(training)} patches, {training.objects} of them show the object {name}")
-        print(f"validation: {len(validation)} proposals, {validation.objects} of them show the object {name}")
-        share = 100.0 * found.proposed / found.objects if found.objects else math.nan
-        print(f"the mesh network proposes {found.proposed} of {found.objects} visible objects ({share:.0f} %)")
+        found = self._patches
+        for kind, name in enumerate(self.run.classes):
+            of = [each.labels[each.kinds == kind] for each in (found.training, found.validation)]
+            (learned, shown_there), (judged, shown_here) = ((len(each), int((each == OBJECT).sum())) for each in of)
+            objects, proposed = found.truths[kind].tolist()
+            share = 100.0 * proposed / objects if objects else math.nan
+            print(f"{name}: {learned} patches for training, {shown_there} of them with the object; for validation")
+            found_here = f"{proposed} of {objects} visible objects ({share:.0f} %)"
+            print(f"  {judged} proposals, {shown_here} of them right: {found_here}")
         print("validation AP: average precision of the validation proposals, from 0 to 1", flush=True)
 
-    def _contract(self) -> LookContract:
-        """The contract of the network, without provenance."""
-        run, patches = self.run, self.run.configuration.patches
-        return LookContract(
-            object_class=run.object_class,
-            upright_radius=run.upright_radius,
-            size=patches.size,
-            extent=patches.extent,
-            max_proposals=patches.max_proposals,
-            channels=run.configuration.network.channels,
-        )
-
-    def _provenance(self, score: LookScore, result: Ranking) -> dict[str, str]:
+    def _provenance(self, scores: Mapping[str, LookScore], results: Mapping[str, Ranking]) -> dict[str, str]:
         """Where the network comes from, for its contract."""
         run, found, recipe = self.run, self._patches, self.run.configuration.training
         return {
@@ -137,27 +138,39 @@ class LookTraining(Training):
             "rounds": str(recipe.rounds),
             "seed": str(recipe.seed),
             "patches_seed": str(run.configuration.patches.seed),
-            "validation_average_precision": f"{score.average_precision:.4f}",
-            "validation_center_error": f"{score.center_error:.4f}",
-            "objects_average_precision": f"{result.precision_recall.average_precision:.4f}",
-            "calibration_error": f"{result.reliability.error:.4f}",
+            "validation_average_precision": _listed({name: each.average_precision for name, each in scores.items()}),
+            "validation_center_error": _listed({name: each.center_error for name, each in scores.items()}),
+            "objects_average_precision": _listed(
+                {name: each.precision_recall.average_precision for name, each in results.items()}
+            ),
+            "calibration_error": _listed({name: each.reliability.error for name, each in results.items()}),
             "torch": str(torch.__version__),
         }
 
 
-def _in_words(score: LookScore) -> tuple[str, str]:
+def _listed(values: Mapping[str, float]) -> str:
+    """A value of each class, for a provenance."""
+    return ", ".join(f"{name} {value:.4f}" for name, value in values.items())
+
+
+def _in_words(scores: Mapping[str, LookScore]) -> tuple[str, str]:
+    def each(attribute: str, digits: int, factor: float = 1.0) -> str:
+        return " / ".join(f"{factor * getattr(score, attribute):.{digits}f}" for score in scores.values())
+
     return (
-        f"validation AP {score.average_precision:.3f}",
-        f", center error {score.center_error:.2f} radii, size error {100.0 * score.size_error:.0f} %",
+        f"validation AP of {' / '.join(scores)} {each('average_precision', 3)}",
+        f", center error {each('center_error', 2)} radii, size error {each('size_error', 0, 100.0)} %",
     )
 
 
 def _examples(validation: PatchSet, presence: Singles) -> Image:
-    """Patches that clearly show an object or clearly none: the network is surer of a twentieth of each kind."""
+    """Of each class, patches that clearly show an object, and as many that clearly show none: the network is surer of a
+    twentieth of each kind."""
     chosen: list[int] = []
-    for shows in (True, False):
-        rows = np.flatnonzero((validation.labels == OBJECT) == shows)
-        surest = rows[np.argsort(-presence[rows] if shows else presence[rows], kind="stable")]
-        start = min(len(surest) // 20, max(len(surest) - _EXAMPLES, 0))
-        chosen += surest[start : start + _EXAMPLES].tolist()
+    for kind in np.unique(validation.kinds):
+        for shows in (True, False):
+            rows = np.flatnonzero((validation.kinds == kind) & ((validation.labels == OBJECT) == shows))
+            surest = rows[np.argsort(-presence[rows] if shows else presence[rows], kind="stable")]
+            start = min(len(surest) // 20, max(len(surest) - _EXAMPLES, 0))
+            chosen += surest[start : start + _EXAMPLES].tolist()
     return validation.patches[chosen]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from vm_embedded.arrays import Mask
 from vm_embedded.errors import InputError
@@ -15,6 +16,7 @@ from vm_workstation.text_tables import shortened
 
 from ..runs.loop import shown
 from .collection import collect_patches
+from .labels import OBJECT
 from .patch_set import PatchChunk, PatchSet
 from .run import LookRun
 
@@ -24,13 +26,11 @@ _NAMED = 20
 
 @dataclass(frozen=True)
 class TrainingPatches:
-    """The patches of a run: for training, and proposals for validation. objects: in validation pictures; proposed: of
-    these, those that some proposal is at."""
+    """The patches of a run: for training, and proposals for validation. truths (C, 2): see PatchChunk."""
 
     training: PatchSet
     validation: PatchSet
-    objects: int
-    proposed: int
+    truths: npt.NDArray[np.int64]
 
     @property
     def pictures(self) -> int:
@@ -47,10 +47,10 @@ def collect(run: LookRun, workers: int, stopped: Callable[[], bool]) -> Training
         paths = collect_patches(run, workers, report)
     # The patches may fill a large part of the memory: the first pass counts them, the second one keeps them.
     counts = {False: 0, True: 0}
-    objects = proposed = 0
+    truths = np.zeros((len(run.classes), 2), dtype=np.int64)
     faults: list[str] = []
     for validates, chunk in _chunks(run, paths):
-        objects, proposed = objects + chunk.objects, proposed + chunk.proposed
+        truths += chunk.truths
         faults += chunk.faults
         for part in counts:
             counts[part] += int((validates == part).sum())
@@ -63,7 +63,7 @@ def collect(run: LookRun, workers: int, stopped: Callable[[], bool]) -> Training
             ends[part] = sets[part].write(ends[part], chunk.patches.part(validates == part))
     _check(run, sets[False], "training")
     _check(run, sets[True], "validation")
-    return TrainingPatches(sets[False], sets[True], objects, proposed)
+    return TrainingPatches(sets[False], sets[True], truths)
 
 
 def _chunks(run: LookRun, paths: Sequence[Path]) -> Iterator[tuple[Mask, PatchChunk]]:
@@ -76,16 +76,19 @@ def _chunks(run: LookRun, paths: Sequence[Path]) -> Iterator[tuple[Mask, PatchCh
 
 
 def _check(run: LookRun, part: PatchSet, name: str) -> None:
-    """Raise InputError if a part has no patch with, or none without, an object."""
+    """Raise InputError if a part has no patch with, or none without, an object of a class."""
     if not len(part):
         raise InputError(
             f"no picture for {name} can be used; vm-train check {run.data} tells why (if the masks have other colors, "
             "give them in [classes] of --config)"
         )
-    if not 0 < part.objects < len(part):
-        found = "none" if not part.objects else "all"
-        raise InputError(
-            f"{found} of the {len(part)} patches for {name} show the object {run.object_class}: the close look needs "
-            f"both; give more pictures if they are few, or check {run.data} with vm-train check, and that {run.model} "
-            "proposes objects in it"
-        )
+    for kind, class_name in enumerate(run.classes):
+        labels = part.labels[part.kinds == kind]
+        shown = int((labels == OBJECT).sum())
+        if not 0 < shown < len(labels):
+            found = "none" if not shown else "all"
+            raise InputError(
+                f"{found} of the {len(labels)} patches for {name} show the object {class_name}: the close look needs "
+                f"both; give more pictures if they are few, or check {run.data} with vm-train check, and that "
+                f"{run.model} proposes objects in it"
+            )

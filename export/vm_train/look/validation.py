@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Mask
-from vm_embedded.detection.looking import Sought, judge_peaks
+from vm_embedded.detection.looking import Judgment, judge_peaks
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.settings import Settings
 from vm_embedded.detection.stopwatch import Stopwatch
@@ -23,8 +23,8 @@ from vm_workstation.worker_process import results_of
 
 from ..scores.calibration import logits_from
 from ..scores.object_ranking import Ranking
-from .labels import OBJECT, UNLABELED, VISIBLE, label_places
-from .observing import Observer, RunPicture, items_of
+from .labels import OBJECT, UNLABELED, label_places
+from .observing import Observed, Observer, RunPicture, items_of
 from .run import LookRun
 from .torch_look import TorchLook
 
@@ -42,22 +42,25 @@ class Judge:
         """The judge of a run. network: not calibrated yet. Raises InputError or ModelError."""
         return cls(Observer.of(run), TorchLook(network, contract), Settings(min_confidence=0.0))
 
-    def __call__(self, item: RunPicture) -> Ranking:
-        """The objects in a picture, with logits before the calibration; none if it can't be used."""
+    def __call__(self, item: RunPicture) -> list[Ranking]:
+        """The objects of each class in a picture, with logits before the calibration; none if it can't be used."""
         try:
-            seen = self.observer.observe(item.files)
+            observation, classes = self.observer.observe(item.files)
         except (InputError, GeometryError):  # was reported when the patches were collected
-            return Ranking.empty()
-        sought = Sought(seen.observation.view, seen.peaks, self.look)
-        (judged,) = judge_peaks(seen.observation, [sought], self.settings, Stopwatch())
-        kept = sorted((each for each in judged if each.reason is None), key=lambda each: -each.confidence)
-        centers = np.array([each.center for each in kept]).reshape(-1, 3)
-        found = label_places(Tangents.at(seen.observation.view, centers), seen.truths)
-        logits = logits_from(np.array([each.confidence for each in kept], dtype=np.float64))
-        counted = (found.labels != UNLABELED) & ~shown_before(found.of)
-        visible = int((seen.truths.visible >= VISIBLE).sum())
-        right = found.labels[counted] == OBJECT
-        return Ranking(confidence=logits[counted], right=right, truths=visible, pictures=1)
+            return [Ranking.empty() for _ in self.look.contract.classes]
+        judged = judge_peaks(observation, [each.sought for each in classes], self.look, self.settings, Stopwatch())
+        return [_ranked(*each) for each in zip(classes, judged, strict=True)]
+
+
+def _ranked(seen: Observed, judged: Sequence[Judgment]) -> Ranking:
+    """The objects of a class in a picture, with logits."""
+    kept = sorted((each for each in judged if each.reason is None), key=lambda each: -each.confidence)
+    centers = np.array([each.center for each in kept]).reshape(-1, 3)
+    found = label_places(Tangents.at(seen.view, centers), seen.truths)
+    logits = logits_from(np.array([each.confidence for each in kept], dtype=np.float64))
+    counted = (found.labels != UNLABELED) & ~shown_before(found.of)
+    right = found.labels[counted] == OBJECT
+    return Ranking(confidence=logits[counted], right=right, truths=seen.visible, pictures=1)
 
 
 def shown_before(objects: npt.NDArray[np.int64]) -> Mask:
@@ -72,15 +75,16 @@ def shown_before(objects: npt.NDArray[np.int64]) -> Mask:
 
 def judge_validation(
     run: LookRun, network: LookNetwork, contract: LookContract, workers: int, report: Callable[[int], None]
-) -> Ranking:
-    """What is found in the validation pictures of a run, with logits; workers: processes, 1 uses only this process.
+) -> list[Ranking]:
+    """What is found of each class in the validation pictures of a run, with logits.
 
-    report: is called with the number of pictures that are done. Raises InputError and VisualMeshError.
+    workers: processes; 1 uses only this process. report: is called with the number of pictures that are done. Raises
+    InputError and VisualMeshError.
     """
     items = [each for each in items_of(run) if each.validates]
-    found, done = Ranking.empty(), count(1)
+    found, done = [Ranking.empty() for _ in contract.classes], count(1)
     with closing(results_of(partial(Judge.of, run, network, contract), items, workers)) as results:
-        for part in results:
-            found += part
+        for parts in results:
+            found = [before + part for before, part in zip(found, parts, strict=True)]
             report(next(done))
     return found

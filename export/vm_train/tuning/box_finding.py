@@ -17,14 +17,13 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.detector import Detector
-from vm_embedded.detection.looking import Look
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.manifest import Manifest
-from vm_embedded.network.model_file import read_model
+from vm_embedded.network.model_file import ModelFile, read_model
 from vm_workstation.worker_process import results_of
 
 from ..boxes.box import Box, BoxedPicture
@@ -32,7 +31,7 @@ from ..boxes.checked_boxes import is_cut
 from ..boxes.unlabeled import FoundBox
 from ..evaluation.box_scores import BoxScores, JudgedFrame
 from .boxed_objects import all_objects
-from .candidates import search_radii, seen_objects
+from .candidates import ClassLook, search_radii, seen_objects
 
 _LOWEST = 0.05
 """Objects of a lower confidence do not count for the average precision."""
@@ -83,9 +82,7 @@ class Trial:
             lowest = min(self.settings.min_confidence, _LOWEST)
             settings = replace(self.settings, min_confidence=lowest, field_features=False)
             return partial(_found_by_detector, Detector(model, settings), judged_class(model.manifest, self.name))
-        name = model.manifest.searched_class
-        assert name is not None
-        return partial(_found_by_look, CloseLook.of(model)[name], self.search)
+        return partial(_found_by_look, searching_look(model), self.search)
 
     def scores(self, frames: Sequence[BoxedPicture], name: str, workers: int, report: Callable[[], None]) -> BoxScores:
         """The scores for a class. workers: processes. report: is called after each frame. Raises as a Finder does."""
@@ -94,6 +91,14 @@ class Trial:
             judged.append(JudgedFrame.of(frame, name, found))
             report()
         return BoxScores(self.name, self.settings.min_confidence, tuple(judged))
+
+
+def searching_look(model: ModelFile) -> ClassLook:
+    """The close look at the objects that a model file with one also finds without lens and pose. Raises ModelError."""
+    look, name = CloseLook.of(model), model.manifest.searched_class
+    assert look is not None  # a model file without a look is measured with lens and pose
+    assert name is not None
+    return ClassLook(look, name)
 
 
 def judged_class(manifest: Manifest, model: str) -> str:
@@ -119,14 +124,14 @@ def _found_by_detector(detector: Detector, name: str, frame: BoxedPicture) -> li
     ]
 
 
-def _found_by_look(look: Look, search: Search, frame: BoxedPicture) -> list[FoundBox]:
+def _found_by_look(look: ClassLook, search: Search, frame: BoxedPicture) -> list[FoundBox]:
     pyramid = Pyramid(read_image(frame.image), "bgr")
     windows, probabilities = seen_objects(pyramid, frame.size, look, search.radii, _ABOVE, _CANDIDATES)
     half = windows.radii[:, None] * (1.0, search.aspect)
     ends = np.array(frame.size) - 0.5
     edges = np.hstack([(windows.centers - half).clip(-0.5, ends), (windows.centers + half).clip(-0.5, ends)])
     return [
-        FoundBox(frame.image, Box(look.contract.object_class, *each), probability)
+        FoundBox(frame.image, Box(look.name, *each), probability)
         for each, probability in zip(edges.tolist(), probabilities.tolist(), strict=True)
         if probability >= _LOWEST
     ]

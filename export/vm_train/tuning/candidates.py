@@ -7,13 +7,26 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from vm_embedded.arrays import Floats
+from vm_embedded.arrays import Floats, Image, Singles
 from vm_embedded.detection.looking import Look
 from vm_embedded.detection.peaks import LARGEST_SIZE
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.lens import Size
 
 from .windows import Windows, grid_windows
+
+
+class ClassLook:
+    """A look network for one of its classes: its answers (n, 4) about that class."""
+
+    def __init__(self, look: Look, name: str) -> None:
+        self.name, self.contract = name, look.contract
+        self._look, self._number = look, look.contract.names.index(name)
+
+    def run(self, patches: Image) -> Singles:
+        """Answers (n, 4) to patches (n, size, size, 3); see Look."""
+        return self._look.run(patches)[:, self._number]
+
 
 _FACTOR = 1.4
 """Ratio of two neighboring sizes; a network still knows an object that is 4/3 of the expected size."""
@@ -34,7 +47,7 @@ def search_radii(objects: Windows) -> Floats:
     return np.geomspace(low, high, count) if count > 1 else np.array([low])
 
 
-def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, above: float, most: int) -> Windows:
+def find_candidates(pyramid: Pyramid, size: Size, look: ClassLook, radii: Floats, above: float, most: int) -> Windows:
     """The windows that look most like an object in a network's first pass, best first.
 
     size: of the frame [px]. radii (s,): to look for [px]. above: lowest probability of a candidate. most: number of
@@ -49,7 +62,7 @@ def find_candidates(pyramid: Pyramid, size: Size, look: Look, radii: Floats, abo
 
 
 def seen_objects(
-    pyramid: Pyramid, size: Size, look: Look, radii: Floats, above: float, most: int
+    pyramid: Pyramid, size: Size, look: ClassLook, radii: Floats, above: float, most: int
 ) -> tuple[Windows, Floats]:
     """The objects that a network sees at its candidates, the most probable first, each once.
 

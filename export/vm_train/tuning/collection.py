@@ -19,7 +19,7 @@ from ..look.labels import UNLABELED
 from ..look.patch_set import PatchChunk, PatchSet
 from ..look.torch_look import TorchLook
 from .boxed_objects import objects_of
-from .candidates import find_candidates
+from .candidates import ClassLook, find_candidates
 from .configuration import WindowSettings
 from .run import TuningRun, tuned_look
 from .windows import Windows, jittered_windows, random_windows
@@ -32,24 +32,23 @@ CHUNK = 20
 class WindowCollector:
     """Cuts the patches of a frame. look: the network before the fine-tuning. radii (s,): of objects [px]."""
 
-    look: TorchLook
+    look: ClassLook
     settings: WindowSettings
     radii: Floats
-    object_class: str
     is_round: bool
 
     @classmethod
     def of(cls, run: TuningRun) -> WindowCollector:
         """The collector of a run. Raises InputError or ModelError."""
         before = tuned_look(run.before)
-        look = TorchLook(before.network, before.contract)
-        return cls(look, run.configuration.patches, run.radii, run.object_class, run.is_round)
+        look = ClassLook(TorchLook(before.network, before.contract), run.object_class)
+        return cls(look, run.configuration.patches, run.radii, run.is_round)
 
     def __call__(self, frame: tuple[int, BoxedPicture]) -> PatchChunk:
         """The patches of a frame, given with its number. Raises InputError if it can't be read any more."""
         (number, picture), settings = frame, self.settings
         pyramid = Pyramid(read_image(picture.image), "bgr")
-        objects = objects_of(picture, self.object_class, self.is_round)
+        objects = objects_of(picture, self.look.name, self.is_round)
         random = random_of(settings.seed, picture.image.name)
         windows = Windows.joined(
             find_candidates(pyramid, picture.size, self.look, self.radii, settings.above, settings.candidates),
@@ -59,8 +58,11 @@ class WindowCollector:
         found = windows.label(objects)
         clear = found.labels != UNLABELED
         patches = windows.part(clear).cut(pyramid, self.look.contract)
+        names = self.look.contract.names
+        kinds = np.full(len(patches), names.index(self.look.name), dtype=np.int8)
         pictures = np.full(len(patches), number, dtype=np.int32)
-        return PatchChunk(PatchSet(patches, found.labels[clear], found.targets[clear], pictures))
+        found_patches = PatchSet(patches, found.labels[clear], found.targets[clear], kinds, pictures)
+        return PatchChunk(found_patches, np.zeros((len(names), 2), dtype=np.int64))
 
 
 def collect_windows(run: TuningRun, workers: int, report: Callable[[int], None]) -> PatchSet:

@@ -25,31 +25,41 @@ _SHARES = tuple(tenth / 10.0 for tenth in range(10, 0, -1))
 
 @dataclass(frozen=True)
 class Remembered:
-    """How well a network knows labeled patches: its calibration on them, and its balanced loss with that."""
+    """How well a network knows labeled patches: for each of its classes its calibration on them, and its balanced loss
+    with that; without patches the identity, and NaN."""
 
-    calibration: Calibration
-    loss: float
+    calibrations: tuple[Calibration, ...]
+    losses: tuple[float, ...]
 
     @classmethod
     def of(cls, network: LookNetwork, patches: PatchSet) -> Remembered:
-        """The calibration and the loss of a network."""
-        logits, shown = logits_of(network, patches.patches)[:, 0].astype(np.float64), patches.labels == OBJECT
-        calibration = Calibration.fit(logits, shown)
-        return cls(calibration, balanced_loss(calibration.scale * logits + calibration.offset, shown))
+        """The calibrations and the losses of a network."""
+        found = [_remembered(network, patches.part(patches.kinds == kind)) for kind in range(network.shape.classes)]
+        return cls(tuple(each for each, _ in found), tuple(loss for _, loss in found))
+
+
+def _remembered(network: LookNetwork, patches: PatchSet) -> tuple[Calibration, float]:
+    """The calibration on patches of one class, and the balanced loss with it."""
+    shown = patches.labels == OBJECT
+    if not 0 < shown.sum() < len(shown):
+        return Calibration(1.0, 0.0), np.nan
+    logits = logits_of(network, patches)[:, 0].astype(np.float64)
+    calibration = Calibration.fit(logits, shown)
+    return calibration, balanced_loss(calibration.scale * logits + calibration.offset, shown)
 
 
 @dataclass(frozen=True, eq=False)
 class Mixture:
     """A calibrated network whose weights are a mean. share: of the weights after the training. loss: balanced, of old
-    patches."""
+    patches; the mean of the classes."""
 
     network: LookNetwork
     share: float
     loss: float
 
-    def loss_of(self, patches: PatchSet) -> float:
-        """The balanced loss of its probabilities of patches; NaN if one kind is missing."""
-        logits, (scale, offset) = logits_of(self.network, patches.patches)[:, 0], self.network.calibration.tolist()
+    def loss_of(self, patches: PatchSet, kind: int) -> float:
+        """The balanced loss of its probabilities of patches of a class; NaN if all or none show an object."""
+        logits, (scale, offset) = logits_of(self.network, patches)[:, 0], self.network.calibration[kind].tolist()
         return balanced_loss(scale * logits.astype(np.float64) + offset, patches.labels == OBJECT)
 
 
@@ -61,21 +71,21 @@ class Mixer:
         self._remembered = Remembered.of(before, old)
 
     def mix(self, after: LookNetwork) -> Mixture:
-        """The mixture with the largest share of the new weights that is within the limit: its loss of old patches is at
-        most (1 + `forgetting`) times that of the network before. If none is, the one with the smallest share.
+        """The mixture with the largest share of the new weights that is within the limit: for each class, its loss of
+        old patches is at most (1 + `forgetting`) times that of the network before. If none is, the one with the
+        smallest share.
 
         The probability of an old patch keeps its meaning: it was calibrated on what is found in whole pictures.
         """
-        before = self._remembered
+        before, limit = self._remembered, (1.0 + self._forgetting) * np.array(self._remembered.losses)
         for share in _SHARES:
             network = mixed(self._before, after, share)
             now = Remembered.of(network, self._old)
-            if now.loss <= (1.0 + self._forgetting) * before.loss:
+            if not (np.array(now.losses) > limit).any():
                 break
-        scale = now.calibration.scale / before.calibration.scale
-        offset = (now.calibration.offset - before.calibration.offset) / before.calibration.scale
-        network.calibration.copy_(torch.tensor([scale, offset]))
-        return Mixture(network, share, now.loss)
+        for row, new, old in zip(network.calibration, now.calibrations, before.calibrations, strict=True):
+            row.copy_(torch.tensor([new.scale / old.scale, (new.offset - old.offset) / old.scale]))
+        return Mixture(network, share, float(np.nanmean(now.losses)))
 
 
 def mixed(before: LookNetwork, after: LookNetwork, share: float) -> LookNetwork:

@@ -8,41 +8,39 @@ import numpy as np
 
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
-from vm_embedded.network.look_contract import LookContract
 
 from ..look.labels import NOTHING, OBJECT
 from ..look.patch_set import PatchChunk, PatchSet
 from ..look.run import read_look_run
-from .rendered_patches import RENDERED, write_rendered
+from .rendered_patches import RENDERED, rendered_names, write_rendered
 
-_CLASS = "ball"
-"""The object in the patches of the package."""
+_COUNTS = {OBJECT: 1600, NOTHING: 2400}
+"""Patches of a class with and without an object in a sample; with a quarter of them of two other classes, these are
+about as many as in six pictures of patches."""
 
-_COUNTS = {OBJECT: 2400, NOTHING: 3600}
-"""Patches with and without an object in a sample; about as many as in six pictures of patches."""
+_OTHERS = 4
+"""Classes after the first one have one of so many patches."""
 
 
-def check_rendered(contract: LookContract, run: Path | None) -> None:
-    """Raise InputError if there are no rendered patches for a look network with this contract.
+def check_rendered(name: str, run: Path | None) -> None:
+    """Raise InputError if there are no rendered patches of a class.
 
     run: folder of the training of the look; None: the patches of the package are to be used.
     """
-    if run is None and contract.object_class != _CLASS:
+    if run is None and name not in (known := rendered_names(RENDERED)):
         raise InputError(
-            f"the package has rendered patches of class {_CLASS!r}, but the close look judges "
-            f"{contract.object_class!r}: give the folder of its vm-train look training with --rendered, so that the "
-            "network does not forget what it has learned"
+            f"the package has rendered patches of {', '.join(known)}, but the close look judges {name!r}: give the "
+            "folder of its vm-train look training with --rendered, so that the network does not forget what it has "
+            "learned"
         )
-    if run is not None and read_look_run(run).object_class != contract.object_class:
-        raise InputError(
-            f"{run} is the training of a look at {read_look_run(run).object_class!r}, not at {contract.object_class!r}"
-        )
+    if run is not None and name not in (judged := read_look_run(run).classes):
+        raise InputError(f"{run} is the training of a look at {', '.join(judged)}, not at {name!r}")
 
 
 def write_rendered_for(path: Path, run: Path | None) -> None:
     """Write the rendered patches for a fine-tuning; see `check_rendered`. Raises InputError."""
     if run is not None:
-        write_rendered(path, sample_run(run))
+        write_sample(path, run)
         return
     try:
         content = RENDERED.read_bytes()
@@ -51,8 +49,8 @@ def write_rendered_for(path: Path, run: Path | None) -> None:
     write_file(path, content)
 
 
-def sample_run(folder: Path) -> PatchSet:
-    """A sample of the training patches of a look network, always the same. Raises InputError."""
+def write_sample(path: Path, folder: Path) -> None:
+    """Write a sample of the training patches of a look network, always the same. Raises InputError."""
     run = read_look_run(folder)
     paths = sorted(run.patches.glob("*.npz"))
     if not paths:
@@ -60,9 +58,12 @@ def sample_run(folder: Path) -> PatchSet:
     random = np.random.default_rng(0)
     validation = np.isin(run.numbers, run.split.validation)
     chosen = []
-    for path in paths:
-        patches = PatchChunk.load(path).patches
-        for label, count in _COUNTS.items():
-            rows = np.flatnonzero((patches.labels == label) & ~validation[patches.pictures])
-            chosen.append(patches.part(np.sort(random.permutation(rows)[: -(-count // len(paths))])))
-    return PatchSet.joined(run.configuration.patches.size, chosen)
+    for each in paths:
+        patches = PatchChunk.load(each).patches
+        for kind in range(len(run.classes)):
+            for label, count in _COUNTS.items():
+                wanted = count // _OTHERS if kind else count
+                rows = (patches.labels == label) & (patches.kinds == kind) & ~validation[patches.pictures]
+                kept = random.permutation(np.flatnonzero(rows))[: -(-wanted // len(paths))]
+                chosen.append(patches.part(np.sort(kept)))
+    write_rendered(path, PatchSet.joined(run.configuration.patches.size, chosen), run.classes)

@@ -19,7 +19,7 @@ from vm_embedded.files import write_file
 from vm_embedded.network.model_file import ModelFile, read_model
 from vm_embedded.output.result_files import make_folder
 from vm_export.look_checkpoint import LookCheckpoint
-from vm_export.look_weights import looks_of
+from vm_export.look_weights import look_of
 
 from ..boxes.box import BoxedPicture, BoxedSet
 from ..boxes.read import read_boxes
@@ -113,11 +113,11 @@ class TuningRun(Run):
 
 
 def tuned_look(model: ModelFile) -> LookCheckpoint:
-    """The close look at objects of a model file, which a fine-tuning changes. Raises ModelError if it has none."""
-    for each in looks_of(model):
-        if each.contract.object_class == model.manifest.searched_class:
-            return each
-    raise ModelError(f"{model.path} has no close look at objects; vm-export --look attaches one")
+    """The close look of a model file, which a fine-tuning changes. Raises ModelError if it has none at objects."""
+    look = look_of(model)
+    if look is None or model.manifest.searched_class is None:
+        raise ModelError(f"{model.path} has no close look at objects; vm-export --look attaches one")
+    return look
 
 
 def begin_tuning(
@@ -138,12 +138,13 @@ def begin_tuning(
     """
     check_unused(folder, _FILES)
     before = read_model(model)
-    look, pictures = tuned_look(before), found.pictures
-    check_boxes(found, look.contract.object_class, str(boxes.folder))
-    check_rendered(look.contract, rendered)
+    tuned_look(before)
+    name_of_class, pictures = before.manifest.searched_class or "", found.pictures
+    check_boxes(found, name_of_class, str(boxes.folder))
+    check_rendered(name_of_class, rendered)
     run = TuningRun(folder, {}, threads, _split(pictures, configuration), boxes, configuration, name, before, pictures)
     for_training = BoxedSet(tuple(run.part(run.split.training)), (), ())
-    check_boxes(for_training, look.contract.object_class, f"{boxes.folder}, part for training,")
+    check_boxes(for_training, run.object_class, f"{boxes.folder}, part for training,")
     make_folder(folder / "patches")
     write_file(folder / "before.onnx", before.content)
     write_rendered_for(run.rendered_path, rendered)

@@ -84,9 +84,13 @@ class Tuning(Training):
         run, settings, recipe = self.run, self.run.configuration, self.run.configuration.training
         self._progress, self._stopped = progress, stopped
         self._before = before = tuned_look(run.before)
+        names = before.contract.names
+        self._kind = names.index(run.object_class)
         with shown(len(run.pictures), stopped) as report:
             own = collect_windows(run, self._workers, report)
-        self._patches = patches = TuningPatches.of(run, own, read_rendered(run.rendered_path, before.contract.size))
+        self._patches = patches = TuningPatches.of(
+            run, own, read_rendered(run.rendered_path, before.contract.size, names)
+        )
         self._digest = own.sha256()
         training, weights = patches.for_training(recipe.own)
         network, old = copy.deepcopy(before.network), before.network.eval()
@@ -119,7 +123,7 @@ class Tuning(Training):
         Without frames for validation, the last one stays.
         """
         mixture = self._mixer.mix(self.learner.network)
-        own = mixture.loss_of(self._patches.own_validation)
+        own = mixture.loss_of(self._patches.own_validation, self._kind)
         if self._progress.is_best(-own):
             self.kept = _copy(mixture.network)
             self._progress.take(-own)
