@@ -27,11 +27,11 @@ from benchmarks.report import DOCS, EXPERIMENTS, fill
 from benchmarks.window_scores import score_frames
 from vm_embedded.cli.progress import ProgressBar
 from vm_embedded.network.bundled import DEFAULT, model_path
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
 from vm_train.boxes.box import BoxedPicture
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.box_options import parse_names
+from vm_train.tuning.box_finding import searching_look
 from vm_train.tuning.boxed_objects import all_objects
 from vm_train.tuning.candidates import search_radii
 from vm_workstation.plots import new_figure, save_figure
@@ -44,12 +44,12 @@ COUNTS = (25, 50, 100, 0)
 SEEDS = (0, 1, 2)
 
 
-def measure(model: Path, frames: Sequence[BoxedPicture], name: str) -> dict[str, Any]:
+def measure(model: Path, frames: Sequence[BoxedPicture]) -> dict[str, Any]:
     """The scores of a model file's close look on frames with boxes of a round object."""
-    look = CloseLook.of(read_model(model))[name]
-    radii = search_radii(all_objects(frames, name, True))
+    look = searching_look(read_model(model))
+    radii = search_radii(all_objects(frames, look.name, True))
     bar = ProgressBar(len(frames), "looked at")
-    score = score_frames(look, frames, name, True, radii, bar.advance)
+    score = score_frames(look, frames, True, radii, bar.advance)
     bar.clear()
     return score.as_dict()
 
@@ -133,11 +133,8 @@ def main() -> None:
     options = parser.parse_args()
     names = parse_names(options.names)
     training, test = (read_boxes(folder, names=names).pictures for folder in (options.training, options.test))
-    before = read_model(model_path(options.model))
-    name = before.manifest.searched_class
-    assert name is not None
     result: dict[str, Any] = {"network": options.model, "test_frames": len(test)}
-    result |= {"before": measure(before.path, test, name), "after": []}
+    result |= {"before": measure(model_path(options.model), test), "after": []}
     print(f"before: {result['before']}", flush=True)
     for count in options.counts:
         for seed in options.seeds:
@@ -147,7 +144,7 @@ def main() -> None:
             folder = options.output / f"{len(frames)}-{seed}"
             made = fine_tune(options.model, frames, seed, folder, options.names)
             row = {"frames": len(frames), "seed": seed, "seconds": json.loads((folder / "seconds").read_text())}
-            result["after"].append(row | measure(made, test, name))
+            result["after"].append(row | measure(made, test))
             print(result["after"][-1], flush=True)
             options.json.write_text(json.dumps(result, indent=1) + "\n")
     plot(result, EXPERIMENTS / "fine-tuning.svg")

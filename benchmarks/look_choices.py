@@ -28,7 +28,7 @@ from vm_embedded.config.sections import read_sections
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
-from vm_export.change_model import change_looks
+from vm_export.change_model import change_look
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.data.pictures import find_pictures
 from vm_train.data.split import Split
@@ -64,12 +64,12 @@ VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
     "4000 pictures": {"pictures": {"training": 4000}},
     "7500 pictures": {"pictures": {"training": 7500}},
     "20 proposals": {"patches": {"max_proposals": 20}},
-    "proposals of soccer": {"mesh": {"network": "soccer"}},
+    "proposals of soccer, also posts and robots": {"mesh": {"network": "soccer"}},
     "one round": {"training": {"rounds": 1}},
     "nothing moved or hidden": {"augmentation": {"rotation": 0.0, "zoom": 0.0, "shift": 0.0, "hidden": 0.0}},
 }
 """Looks to compare, by name: the changes to benchmarks/look_choices.toml. `pictures` and `mesh` are not sections of
-it: they say how many pictures a training has, and which network proposes."""
+it: they say how many pictures a training has, and which network proposes. A look judges all that it proposes."""
 
 Task = tuple[str, int, Path, Path, Path]
 """Variant, seed, and the folders of training pictures, test pictures and trainings."""
@@ -115,7 +115,7 @@ def trained(task: Task) -> Path:
             train(LookTraining(run, hardware), hardware, lambda: False)
     path = folder / "model.onnx"
     if not path.exists():
-        change_looks(model, path, [LookCheckpoint.load(run.result_path)])
+        change_look(model, path, LookCheckpoint.load(run.result_path))
     return path
 
 

@@ -40,9 +40,6 @@ RESULTS = HERE / "shipped.json"
 WORST = HERE.parent / "docs" / "worst.jpg"
 NETWORKS = HERE.parent / "export" / "networks"
 FRAMES_AN_HOUR = 30 * 3600
-RECIPES = {"ball": ("ball-look",), "soccer": ("ball-look", "goal-look", "robot-look")}
-"""The files in NETWORKS from which the close looks of each network of the package were trained. That of its mesh
-network has its name."""
 RANGES = {"0.5 to 6 m": range(1, 12), "6 to 10 m": range(12, 20), "1 to 6 m": range(2, 12)}
 """Bins of half a meter."""
 

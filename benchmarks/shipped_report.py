@@ -13,7 +13,7 @@ from benchmarks import measured_frames
 from benchmarks.field import RESULTS as FIELD_RESULTS
 from benchmarks.field import figures
 from benchmarks.report import DOCS, EXPERIMENTS, README, fill, number, table
-from benchmarks.shipped import METERS, NETWORKS, RANGES, RECIPES, RESULTS, SETS
+from benchmarks.shipped import METERS, NETWORKS, RANGES, RESULTS, SETS
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.model_file import read_model
@@ -185,15 +185,16 @@ def plot(found: dict[str, Any]) -> None:
     save_figure(figure, DOCS / "networks.svg")
 
 
-def _look_data(look: LookContract, recipe: str) -> str:
+def _look_data(look: LookContract) -> str:
     """The training data of a close look, for a card."""
     channels, made = ", ".join(map(str, look.channels)), look.provenance
-    return (
-        f"- **Close look at class {look.object_class}:** {look.size} x {look.size} samples, convolutions of {channels} "
-        f"channels.\n  {made['training_pictures']} pictures of the same kind. Seed {made['seed']}, configuration\n  "
-        f"`export/networks/{recipe}.toml`. Calibrated on {made['calibrated_on']}\n"
-        "  (`python -m benchmarks.calibration_data`).\n"
+    calibrated = ", ".join(f"class {name} on {made[f'calibrated_on_{name}']}" for name in look.names)
+    text = (
+        f"- **Close look at {', '.join(look.names)}:** {look.size} x {look.size} samples, convolutions of {channels} "
+        f"channels. {made['training_pictures']} pictures of the same kind. Seed {made['seed']}, configuration "
+        f"`export/networks/look.toml`. Calibrated, {calibrated} (`python -m benchmarks.calibration_data`)."
     )
+    return textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n"
 
 
 def card(found: dict[str, Any], field: dict[str, Any], name: str) -> str:
@@ -207,7 +208,7 @@ def card(found: dict[str, Any], field: dict[str, Any], name: str) -> str:
     manifest = model.manifest
     configuration = tomllib.loads((NETWORKS / f"{name}.toml").read_text())
     depth, width = (configuration["network"][each] for each in ("depth", "width"))
-    looks = "".join(map(_look_data, manifest.looks, RECIPES[name]))
+    assert manifest.look is not None
     scores, clutter = (found["networks"][name][each] for each in SETS)
     ranges = table(
         ["distance", "balls", "AP50", "AP75", "recall [%]"],
@@ -237,7 +238,7 @@ Classes: {", ".join(each.name for each in manifest.classes)}.
 - **Training data of the mesh network:** {made["training_pictures"]} rendered pictures
   (`export/vm_synth/varied.toml`, seed 1). Validation on {made["validation_pictures"]} other pictures chose epoch
   {made["epoch"]} of {made["epochs"]}. Seed {made["seed"]}, configuration `export/networks/{name}.toml`.
-{looks}- **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
+{_look_data(manifest.look)}- **To train it again:** `make networks HDRI=folder-of-maps`. The file's SHA-256 is
   {model.sha256}.
 
 The test has {scores["pictures"]} rendered pictures of fields under six panoramas that no training uses, {size} px, with

@@ -58,7 +58,8 @@ def scored(pictures: list[tuple[list[TrueObject], Observation]], settings: Setti
     scores = ObjectScores(min_radius=2.0)
     for truths, observation in pictures:
         watch = Stopwatch()
-        found, _ = locate(observation, judge_classes(observation, {}, settings, watch, uprights=False), settings, watch)
+        judged = judge_classes(observation, None, settings, watch, uprights=False)
+        found, _ = locate(observation, judged, settings, watch)
         scores.add(truths, found)
     return scores
 

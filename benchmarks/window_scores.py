@@ -10,12 +10,11 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats
 from vm_embedded.cameras.image_files import read_image
-from vm_embedded.detection.looking import Look
 from vm_embedded.detection.pyramid import Pyramid
 from vm_train.boxes.box import BoxedPicture
 from vm_train.look.collection import random_of
 from vm_train.tuning.boxed_objects import objects_of
-from vm_train.tuning.candidates import find_candidates
+from vm_train.tuning.candidates import ClassLook, find_candidates
 from vm_train.tuning.windows import Windows, random_windows
 
 REPORTED = 0.5
@@ -91,14 +90,13 @@ class WindowScores:
 
 
 def score_frames(
-    look: Look,
+    look: ClassLook,
     frames: Sequence[BoxedPicture],
-    object_class: str,
     is_round: bool,
     radii: Floats,
     report: Callable[[], None],
 ) -> WindowScores:
-    """The scores of a network on frames.
+    """The scores of a network for its class on frames.
 
     radii (s,): of the objects to look for [px]. report: is called after each frame. Raises InputError for a frame that
     can't be read, and ModelError.
@@ -107,7 +105,7 @@ def score_frames(
     others: list[Looked] = []
     for number, frame in enumerate(frames):
         pyramid = Pyramid(read_image(frame.image), "bgr")
-        objects = objects_of(frame, object_class, is_round)
+        objects = objects_of(frame, look.name, is_round)
         somewhere = random_windows(frame.size, radii, _RANDOM, random_of(0, frame.image.name))
         candidates = find_candidates(pyramid, frame.size, look, radii, _ABOVE, _CANDIDATES)
         boxes.append(_looked(pyramid, look, objects, number))
@@ -118,7 +116,7 @@ def score_frames(
     return WindowScores(Looked.joined(boxes), Looked.joined(others))
 
 
-def _looked(pyramid: Pyramid, look: Look, windows: Windows, number: int) -> Looked:
+def _looked(pyramid: Pyramid, look: ClassLook, windows: Windows, number: int) -> Looked:
     answers = look.run(windows.cut(pyramid, look.contract)).astype(np.float64)
     seen = windows.moved(answers[:, 1], answers[:, 2])
     return Looked(seen, np.full(len(windows), number, dtype=np.intp), answers[:, 0])

@@ -78,8 +78,7 @@ def proposals(found: dict[str, Any]) -> str:
         for name, row in part["networks"].items()
     ]
     for name, row in part["stage"].items():
-        count = row["patches"]["ball"]
-        rows.append([f"whole stage of {name}", "-", "-", f"{row['p50'] / count:.3f}"])
+        rows.append([f"whole stage of {name}", "-", "-", f"{row['p50'] / row['patches']:.3f}"])
     return table(["network", "MFLOP", "alone", f"in a call of {part['batch']}"], rows)
 
 

@@ -32,7 +32,7 @@ from vm_embedded.detection.looking import Look
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_export.look_network import LookNetwork, LookShape
-from vm_export.look_weights import looks_of
+from vm_export.look_weights import look_of
 
 from ..frames import Frame, frame_folder, frames, read_frames
 from ..instruction_sets import SETS, copy_runtime
@@ -71,7 +71,7 @@ _ROW, _SLOW_ROW = 30, 3
 """Calls in a row in each turn."""
 
 _BATCH = 10
-"""Patches of a call: as many as the networks of the package look at for balls."""
+"""Patches of a call: as many as the networks of the package look at for a class."""
 
 
 class CountedLook:
@@ -85,9 +85,11 @@ class CountedLook:
         return self._look.run(patches)
 
 
-def look_shapes(name: str) -> dict[str, LookShape]:
-    """The shapes of the looks of a packaged network, by class."""
-    return {each.contract.object_class: each.network.shape for each in looks_of(read_model(model_path(name)))}
+def look_shape(name: str) -> LookShape:
+    """The shape of the look of a packaged network."""
+    look = look_of(read_model(model_path(name)))
+    assert look is not None
+    return look.network.shape
 
 
 def look_operations(shape: LookShape) -> int:
@@ -104,15 +106,13 @@ def own_work(name: str, detector: Detector, frame: Frame) -> dict[str, Any]:
     seen = detector.observe(frame.image, frame.orientation, frame.lens)
     points = len(seen.pixels)
     found: dict[str, Any] = {"points": points, "operations": detector.manifest.operations * points}
-    if detector.looks:
-        looks, counted = detector.looks, {name: CountedLook(each) for name, each in detector.looks.items()}
-        detector.looks = counted  # type: ignore[assignment]
+    if detector.look is not None:
+        look, counted = detector.look, CountedLook(detector.look)
+        detector.look = counted  # type: ignore[assignment]
         own_call(detector, frame)()
-        detector.looks = looks
-        found["patches"] = {name: each.patches for name, each in counted.items()}
-        found["operations"] += sum(
-            look_operations(shape) * found["patches"][each] for each, shape in look_shapes(name).items()
-        )
+        detector.look = look
+        found["patches"] = counted.patches
+        found["operations"] += look_operations(look_shape(name)) * counted.patches
     return found
 
 
@@ -224,9 +224,9 @@ def proposals(frame: Frame, rounds: int) -> dict[str, Any]:
         return partial(look.run, random.integers(0, 256, (count, size, size, 3), dtype=np.uint8))
 
     for name, detector in detectors.items():
-        for each, shape in look_shapes(name).items():
-            title = f"close look of {name} at {each}, {shape.size} x {shape.size}"
-            networks[title] = partial(look_call, detector.looks[each]), look_operations(shape)
+        shape = look_shape(name)
+        title = f"close look of {name}, {shape.size} x {shape.size}"
+        networks[title] = partial(look_call, detector.look), look_operations(shape)
     calls = {f"{name} / {count}": make(count) for name, (make, _) in networks.items() for count in (1, _BATCH)}
     times = interleaved(calls, rounds, row=10)
     found: dict[str, Any] = {
