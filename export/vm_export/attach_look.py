@@ -10,10 +10,10 @@ import torch
 
 import vm_embedded
 from vm_embedded.arrays import Image, Singles
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.look_contract import LOOK_KEY, LookContract
 from vm_embedded.network.look_example import LookTest, made_patches
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
+from vm_embedded.network.session import CloseLook
 
 from .look_checkpoint import LookCheckpoint
 from .look_graph import look_model

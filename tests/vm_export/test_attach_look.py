@@ -9,10 +9,9 @@ from tests.looks import random_patches
 from tests.vm_export.checkpoints import peak_checkpoint
 from tests.vm_export.looks import look_checkpoint, look_network, torch_answers
 from vm_embedded.errors import ModelError
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.look_contract import look_key
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
-from vm_embedded.network.session import Session
+from vm_embedded.network.session import CloseLook, Session
 from vm_export import attach_look, export
 from vm_export.change_model import change_looks
 from vm_export.eight_bits import round_kernels

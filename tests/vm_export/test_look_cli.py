@@ -7,8 +7,8 @@ from tests.vm_export.checkpoints import peak_checkpoint
 from tests.vm_export.looks import look_checkpoint
 from tests.vm_export.test_cli import names_in, run
 from tests.vm_export.test_reference import reference_file
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import CloseLook
 from vm_export.checkpoint import Checkpoint
 from vm_export.cli import main
 from vm_export.export import export

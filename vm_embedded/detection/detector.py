@@ -9,19 +9,17 @@ from ..errors import InputError
 from ..geometry.lens import Lens, Size
 from ..geometry.orientation import Orientation
 from ..network.bundled import model_path
-from ..network.close_look import CloseLook
 from ..network.model_file import ModelFile, read_model
-from ..network.session import Session
+from ..network.session import CloseLook, Session
 from .cache import MeshCache
 from .detections import Detections
 from .field_points import locate_features
 from .looking import judge_classes
 from .objects import locate
-from .observation import Observation, observe
+from .observation import Observation, Stopwatch, observe
 from .pixel_formats import checked_image
 from .pyramid import Pyramid
 from .settings import Settings
-from .stopwatch import Stopwatch
 
 
 class Detector:

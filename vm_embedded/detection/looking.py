@@ -9,20 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
 
 from ..arrays import Chosen, Floats, Image, Singles
 from ..field.features import UPRIGHTS
-from ..geometry.circle import Circle
+from ..geometry.shapes import Circle
 from ..network.look_contract import LookContract
-from .observation import Observation
+from .observation import Observation, Stopwatch
 from .patches import cut_places
 from .peaks import LARGEST_SIZE, Peaks, probability_of
 from .prepared_view import PreparedView
 from .settings import Settings
-from .stopwatch import Stopwatch
 
 _NEAR = 0.3
 """Places within this share of an object's radius around its center were meant to be its center."""
@@ -92,7 +92,11 @@ class Sought:
 
 def around_bases(observation: Observation, radius: float) -> PreparedView:
     """The same points, where circles on the plane with this radius [m] are sought: one around each base."""
-    return observation.view._replace(shape=Circle(radius))
+    return observation.view._replace(shape=_circle(radius))
+
+
+_circle = lru_cache(maxsize=8)(Circle)
+"""The circles with a few radii: to make and check one takes longer than to use it."""
 
 
 Judged = Mapping[str, tuple[Sought, list[Judgment]]]

@@ -16,7 +16,7 @@ from .detection import Detection
 from .detector import Detector
 from .looking import judge_classes
 from .objects import locate
-from .stopwatch import Stopwatch
+from .observation import Stopwatch
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,9 @@ from .detection import Detection
 from .fitting import best_scale, fit
 from .judging import judge
 from .looking import Judged, Judgment
-from .observation import Observation
+from .observation import Observation, Stopwatch
 from .projection import along
 from .settings import Settings
-from .stopwatch import Stopwatch
 
 _SAME_SIZE = 0.2
 """With peaks, a Detection's `distance` and `distance_by_angle` agree if its apparent size differs from the

@@ -18,8 +18,8 @@ from ..geometry.orientation import rotation_z
 from .detection import Detection
 from .detections import Detections
 from .kalman import correct, predict, squared_distances
+from .observation import Stopwatch
 from .place_error import place_errors
-from .stopwatch import Stopwatch
 from .track import Track
 from .track_settings import TrackSettings
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from .border import find_border
 from .circle import CirclePoints, find_circle
 from .crossings import certain_crossings, possible_crossings
 from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
-from .goals import pair_posts
 from .ground_points import GroundPoints, starts_of_runs
 from .lines import LEAST, LinePoints, Piece, find_pieces, line_points
 from .ridges import Profiles, pieces_on_ridges
+
+_WIDTHS = (1.2, 3.4)
+"""Smallest and largest distance of a goal's posts [m]: from children's robots to those of adult size."""
 
 ToPixels = Callable[[Floats], Floats]
 """Pixels (n, 2) of places (n, 2) [m] on the plane; NaN outside of the picture."""
@@ -97,3 +99,21 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     sums = np.add.reduceat(columns, starts_of_runs(cells.take(order)), axis=1)
     x, y, weights = sums[:3] / sums[3]
     return np.array([x, y]).T, weights.astype(np.float32)
+
+
+def pair_posts(posts: Sequence[Upright]) -> tuple[tuple[int, int], ...]:
+    """Indices of the left and right post of each goal, narrowest first; each post belongs to one goal at most."""
+    pairs = []
+    for number, one in enumerate(posts):
+        for before in range(number):
+            apart = float(np.hypot(*(one.position - posts[before].position)))
+            if _WIDTHS[0] <= apart <= _WIDTHS[1]:
+                pairs.append((apart, before, number))
+    found: list[tuple[int, int]] = []
+    taken: set[int] = set()
+    for _, first, second in sorted(pairs):
+        if not taken & {first, second}:
+            taken |= {first, second}
+            (x, y), (u, v) = posts[first].position, posts[second].position
+            found.append((first, second) if u * y - v * x > 0.0 else (second, first))
+    return tuple(found)

@@ -8,7 +8,6 @@ answers are in the order of the mesh.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,9 +17,6 @@ from ..arrays import Chosen, Mask, Singles
 
 Feeds = dict[str, npt.NDArray[np.generic]]
 """A network's inputs by name."""
-
-Run = Callable[[Feeds], Singles]
-"""A network: from its inputs to its output."""
 
 OFF_SCREEN = np.float32(-1.0)
 """Color of the off-screen point."""
@@ -36,16 +32,12 @@ class Layout(ABC):
     def spread(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """The values (n,) of points in their places (m,), and 0 in places without one."""
 
-    def answers(self, network: Run, colors: Singles, on_screen: Mask, points: Chosen) -> Singles:
-        """All outputs (k, outputs) for points (k,) on screen.
+    @abstractmethod
+    def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
+        """The network's inputs, with the color OFF_SCREEN where it needs the off-screen point.
 
         colors (3, m): of the places. on_screen (n,): which points of the mesh are on screen.
         """
-        return self.read(network(self.feeds(colors, on_screen)), points)
-
-    @abstractmethod
-    def feeds(self, colors: Singles, on_screen: Mask) -> Feeds:
-        """The network's inputs, with the color OFF_SCREEN where it needs the off-screen point; see `answers`."""
 
     @abstractmethod
     def read(self, output: Singles, points: Chosen) -> Singles:

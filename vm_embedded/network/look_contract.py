@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any
 
 from ..borders.text import name_fault, text_fault
@@ -72,7 +73,7 @@ class LookContract:
         check_number("extent of the close look", self.extent, 0.5, 8.0)
         check_number("max_proposals of the close look", self.max_proposals, 1, 128, whole=True)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the classes."""
         return tuple(each.name for each in self.classes)

@@ -13,8 +13,8 @@ from types import UnionType
 
 from ..borders.text import name_fault
 from ..errors import GeometryError, InputError, ModelError, unknown
-from ..geometry.make_shape import SHAPES, make_shape
 from ..geometry.shape import Shape
+from ..geometry.shapes import SHAPES, make_shape
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
@@ -37,7 +37,7 @@ for; see detection/footprint.py."""
 
 POINT_COLORS = ("absolute", "relative")
 """Colors that the network takes. absolute: from 0 to 1. relative: normalized with the mean and the deviation of the
-picture's points; see detection/color_normalization.py."""
+picture's points; see detection/sampling.py."""
 
 _LARGEST = 1e9
 """Limit of every radius, distance, number of rings and number of operations."""
@@ -96,7 +96,7 @@ class Manifest:
     scale: see `channels`.
     sampling: one of POINT_SAMPLINGS.
     colors: one of POINT_COLORS.
-    look: description of the look network, which judges peaks; see close_look.py. None without one.
+    look: description of the look network, which judges peaks; see session.py. None without one.
     peaks: names of classes of kind object or upright, for which the network also says where objects are; only on mesh
         octaves. After the probabilities of all classes, each of them has four outputs for each cell: the score, a
         logit of whether the place of an object is in the cell; the shift to the right and up from the cell to this

@@ -12,30 +12,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-
 from vm_embedded.arrays import Chosen, Floats, Mask, Singles
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.looking import judge_classes
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Classifier, Observation, classify
+from vm_embedded.detection.observation import Classifier, Observation, Stopwatch, classify
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import FieldFeatures
 from vm_embedded.files import read_bytes
 from vm_embedded.geometry.orientation import rotation_z
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.network.choose_layout import choose_layout
-from vm_embedded.network.close_look import CloseLook
-from vm_embedded.network.layout import Feeds, Layout
+from vm_embedded.network.layout import Layout
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import read_model
-from vm_embedded.network.session import Session
+from vm_embedded.network.session import CloseLook, Session
 from vm_export.grid import VISUAL, Grid
 
 from ..data.pictures import Picture
@@ -209,9 +205,7 @@ class TorchNetwork:
         """See detection.observation.Classifier."""
         import torch
 
-        def network(feeds: Feeds) -> Singles:
-            with torch.inference_mode():
-                output = self._network(**{name: torch.from_numpy(each) for name, each in feeds.items()})
-            return np.asarray(output.numpy(), dtype=np.float32)
-
-        return layout.answers(network, colors, on_screen, points)
+        feeds = {name: torch.from_numpy(each) for name, each in layout.feeds(colors, on_screen).items()}
+        with torch.inference_mode():
+            output: Singles = self._network(**feeds).numpy()
+        return layout.read(output, points)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.network.manifest import Manifest
 from vm_export.grid import Grid
 from vm_workstation.plots import new_figure

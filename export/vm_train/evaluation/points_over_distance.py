@@ -11,7 +11,7 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import build_mesh
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vm_embedded.detection.color_normalization import normalized
+from vm_embedded.detection.sampling import normalized
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.files import read_regular
 from vm_embedded.network.manifest import Manifest

@@ -21,9 +21,9 @@ from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.geometry.lens_files import read_lens_file
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.manifest import Manifest
 from vm_embedded.network.model_file import ModelFile, read_model
+from vm_embedded.network.session import CloseLook
 from vm_workstation.worker_process import results_of
 
 from ..boxes.box import Box, BoxedPicture

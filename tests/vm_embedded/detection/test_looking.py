@@ -11,12 +11,11 @@ from tests.manifests import ball_manifest
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.looking import around_bases, judge_classes, judged_places
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Observation
+from vm_embedded.detection.observation import Observation, Stopwatch
 from vm_embedded.detection.patches import Tangents, cut_patches, cut_places, patch_nodes
 from vm_embedded.detection.projection import project
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.geometry.orientation import Orientation
 
 from ..strategies import seeds

@@ -9,7 +9,7 @@ from vm_embedded.detection.projection import project
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 
 SIZE = (640, 512)

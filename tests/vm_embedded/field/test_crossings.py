@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.field.crossings import certain_crossings, possible_crossings
 from vm_embedded.field.features import Upright
-from vm_embedded.field.goals import pair_posts
+from vm_embedded.field.find import pair_posts
 from vm_embedded.field.lines import Piece
 
 from .ground import turned

@@ -19,11 +19,11 @@ from tests.looks import (
 )
 from tests.manifests import ball_manifest
 from vm_embedded.errors import ModelError
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.look_contract import LookContract
 from vm_embedded.network.look_example import LookTest
 from vm_embedded.network.manifest import METADATA_KEY, Manifest
 from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import CloseLook
 
 from ..strategies import attempt, class_names, printable, reals, seeds
 

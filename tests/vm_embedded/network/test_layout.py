@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import ModelError
-from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Sphere
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout

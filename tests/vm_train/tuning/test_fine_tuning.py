@@ -10,8 +10,8 @@ import pytest
 
 from tests.vm_train.commands import run, run_and_stop
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import CloseLook
 from vm_export.look_weights import looks_of
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.train import main

@@ -5,8 +5,8 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.close_look import CloseLook
 from vm_embedded.network.model_file import read_model
+from vm_embedded.network.session import CloseLook
 from vm_train.look.labels import OBJECT
 from vm_train.look.patch_set import PatchSet
 from vm_train.tuning.rendered_patches import RENDERED, read_rendered, write_rendered
