@@ -23,6 +23,7 @@ from .detection import Detection
 from .observation import Observation
 from .overhead import draw_overhead
 from .overlay import draw_overlay
+from .pose_state import PoseState
 from .table import to_csv, to_row
 
 STAGES = ("mesh", "project", "sample", "infer", "propose", "look", "cluster", "field", "track", "total")
@@ -55,12 +56,14 @@ class Results(Record):
     """What messages have of a frame.
 
     points: number of mesh points on screen. detections: the objects, most confident first. field: features of the
-    field; only with a network that knows them. timing_ms [ms]: time of each stage and of the whole call.
+    field; only with a network that knows them. pose: what the frames so far say about the camera's pose; null if it is
+    not checked. timing_ms [ms]: time of each stage and of the whole call.
     """
 
     points: Annotated[int, SIZE]
     detections: Annotated[tuple[Detection, ...], Sent()]
     field: Annotated[FieldFeatures | None, Sent()] = None
+    pose: Annotated[PoseState | None, Sent(null=True)] = None
     timing_ms: Annotated[Mapping[str, float], Sent(least=0, allowed=STAGES)]
 
 
@@ -71,7 +74,8 @@ class Detections:
     objects: the accepted objects. rejected: the rejected candidates, each with its reason; empty unless `explain` was
     set. observation: the points. threshold: a point belongs to a class if its probability is above this. timing_ms:
     time of each stage [ms]. field: goal posts, robots, lines and border of the field; None for a network without these
-    classes, and with `field_features` off.
+    classes, and with `field_features` off. pose: what this frame and those before say about the camera's pose, if a
+    PoseCheck collects it.
     """
 
     objects: tuple[Detection, ...]
@@ -80,6 +84,7 @@ class Detections:
     threshold: float
     timing_ms: dict[str, float]
     field: FieldFeatures | None = None
+    pose: PoseState | None = None
 
     def __len__(self) -> int:
         return len(self.objects)
@@ -101,7 +106,7 @@ class Detections:
         return f"<{len(self.objects)} detections, {len(self.pixels)} points: {list(self.objects)}>"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, timing_ms [ms].
+        """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, pose, timing_ms.
 
         Without field features, the key `field` is missing.
         """
@@ -253,7 +258,13 @@ class Detections:
 
 def results(found: Detections) -> Results:
     """What messages have of these detections."""
-    return Results(points=len(found.pixels), detections=found.objects, field=found.field, timing_ms=found.timing_ms)
+    return Results(
+        points=len(found.pixels),
+        detections=found.objects,
+        field=found.field,
+        pose=found.pose,
+        timing_ms=found.timing_ms,
+    )
 
 
 def edges_in_image(outline: Floats, size: tuple[int, int]) -> Floats:

@@ -45,7 +45,7 @@ def find_features(
     near = line_points(points)
     likely = near.part((near.weights > LEAST).nonzero()[0])
     pieces, circle = _straight_and_round(near, likely)
-    pieces = pieces_on_ridges(pieces, points, profiles)
+    pieces, ridges = pieces_on_ridges(pieces, points, profiles)
     confidences = [float(likely.weights.take(each.members).sum()) / len(each.members) for each in pieces]
     crossings = possible_crossings(pieces, confidences)
     behind = np.array([each for _, *both in crossings for each in both], dtype=np.complex128)
@@ -66,6 +66,7 @@ def find_features(
         line_points=thinned,
         line_confidences=likelihoods,
         border=Border(border, pixels[len(ends) : len(ends) + len(border)]) if len(border) else None,
+        ridges=ridges,
     )
 
 

@@ -12,9 +12,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..arrays import Floats, Singles
+from ..arrays import Chosen, Floats, Singles
 from .ground_points import GroundPoints, leaning
 from .lines import Piece, tolerance
+from .ridge_edges import Ridges
 
 Profiles = Callable[[Floats, int], tuple[Singles, Floats]]
 """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of each stretch (n, 2, 2) [m] on
@@ -75,13 +76,15 @@ _MOST_SUPPORT = 6.0
 """More support does not count."""
 
 
-def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Profiles) -> list[Piece]:
-    """The pieces that points and picture speak for, moved to their ridges, in the same order.
+def pieces_on_ridges(
+    pieces: Sequence[Piece], points: GroundPoints, profiles: Profiles
+) -> tuple[list[Piece], Ridges | None]:
+    """The pieces that points and picture speak for, moved to their ridges, in the same order; and the ridges of all.
 
     points: of the frame; their spacing says how far a ridge may be. profiles: brightness of the frame.
     """
     if not pieces:
-        return []
+        return [], None
     ends = np.array([each.ends for each in pieces])  # (p, 2, 2)
     lengths = np.array([each.length for each in pieces])
     normals = (ends[:, 1] - ends[:, 0])[:, ::-1] * (-1.0, 1.0) / lengths[:, None]
@@ -94,13 +97,19 @@ def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Pr
     middle = np.sort(pixels.reshape(-1, _STATIONS), axis=1)[:, _STATIONS // 2]
     widths = np.maximum(_WIDTH / steps, _BLUR / np.maximum(middle, 1e-6))
     contrasts = _contrasts(brightness.reshape(-1, _STATIONS, _SAMPLES), widths)
-    shifts, shares = _best_shifts(contrasts, free, lengths)
+    shifts, near, beside = _best_shifts(contrasts, free, lengths)
+    shown = beside.max(axis=1) > _CONTRAST
+    shares = shown.sum(axis=1) / _STATIONS
     moved = ends + shifts[:, :, None] * normals[:, None]
-    return [
+    at = near[:, 1] + beside.argmax(axis=1) - 1
+    spans = reach @ (_SHARES.T / _HALF)
+    ridges = Ridges(brightness, at, shown, spans, pixels.reshape(-1, _STATIONS), ends, normals, lengths, _AT)
+    kept = [
         Piece(its_ends, math.hypot(piece.length, last - first), piece.members, piece.support)
         for piece, its_ends, (first, last), share in zip(pieces, moved, shifts.tolist(), shares.tolist(), strict=True)
         if share + _SUPPORT_WORTH * min(piece.support, _MOST_SUPPORT) > _LEAST
     ]
+    return kept, ridges
 
 
 def _free_reach(ends: Floats, normals: Floats, points: GroundPoints) -> Floats:
@@ -144,9 +153,9 @@ def _contrasts(brightness: Singles, widths: Floats) -> Singles:
     return np.asarray(np.minimum(np.maximum(contrasts, _LIMITS[0]), _LIMITS[1]))
 
 
-def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Floats, Floats]:
-    """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, and the share of stations (p,) with
-    a ridge there.
+def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Floats, Chosen, Singles]:
+    """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, the positions (p, 3, T) of the
+    samples there and beside, and their contrasts (p, 3, T).
 
     contrasts (p, T, N): see _contrasts. free (p, 2) [m]: how far the ridge may be from the ends. lengths (p,) [m]: of
     the pieces.
@@ -163,6 +172,5 @@ def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Flo
     best = totals.reshape(count, -1).argmax(axis=1)
     rows = np.arange(count)
     near = places.reshape(count, -1, _STATIONS)[rows, best][:, None] + _BESIDE  # (p, 3, T)
-    shown = contrasts.take(near, mode="clip").max(axis=1)  # the first and the last sample have the contrast 0
-    shares = (shown > _CONTRAST).sum(axis=1) / _STATIONS
-    return np.array([one[rows, best // _SHIFTS], other[rows, best % _SHIFTS]]).T, shares
+    beside = contrasts.take(near, mode="clip")  # the first and the last sample have the contrast 0
+    return np.array([one[rows, best // _SHIFTS], other[rows, best % _SHIFTS]]).T, near, beside

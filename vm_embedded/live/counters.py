@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import asdict, dataclass
 
 from ..cameras.grabber import Grabber
 from ..detection.cache import MeshCache
 from ..detection.detections import Detections
+from ..detection.pose_state import PoseState
 from ..output.channels import Channels
 from ..poses.stream import PoseStream
 from .prometheus import Histogram, to_prometheus_text
@@ -68,7 +70,7 @@ class Counters:
         poses = {"poses": self._poses.received, "poses_bad": self._poses.bad}
         return {**asdict(self.outcomes), **poses, "dropped": self._outputs.dropped, **asdict(self._grabber.counts)}
 
-    def metrics(self, state: str, cache: MeshCache, answered: float) -> str:
+    def metrics(self, state: str, cache: MeshCache, answered: float, pose: PoseState) -> str:
         """All metrics in Prometheus's text format. answered: monotonic time of the last answered frame [s]."""
         now = time.monotonic()
         cached = {"cache_hits": cache.hits, "cache_misses": cache.misses, "cache_prepared": cache.prepared}
@@ -76,6 +78,17 @@ class Counters:
             "frame_age_seconds": ("time since the last frame was answered", now - max(answered, self._started)),
             "resident_bytes": ("memory of the process", resident_bytes()),
             "uptime_seconds": ("time since the process started", now - self._started),
+            **_pose_errors(pose),
         }
         counters = {name: (_HELP[name], float(value)) for name, value in {**self.counts(), **cached}.items()}
-        return to_prometheus_text(counters, gauges, state, self._stages)
+        return to_prometheus_text(counters, gauges, {"state": state, "pose": pose.verdict}, self._stages)
+
+
+def _pose_errors(pose: PoseState) -> dict[str, tuple[str, float]]:
+    """Help and value of the metrics of the pose; NaN is what frames do not show."""
+    errors = {
+        "pose_pitch_error_degrees": ("true minus assumed pitch, as frames show it", pose.pitch),
+        "pose_roll_error_degrees": ("true minus assumed roll, as frames show it", pose.roll),
+        "pose_height_error_percent": ("how much larger the true height is than the assumed one", pose.height),
+    }
+    return {name: (help, math.nan if value is None else value) for name, (help, value) in errors.items()}

@@ -6,10 +6,18 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 
+from ..detection.pose_state import VERDICTS
 from ..output.messages import STATES
 
 _BUCKETS = (0.0005, 0.001, 0.002, 0.003, 0.005, 0.008, 0.012, 0.02, 0.033, 0.05, 0.1, 0.25, 1.0, math.inf)
 """Upper bounds of the histogram buckets [s]."""
+
+
+_LABELS = {
+    "state": ("whether the detector is in a state", STATES),
+    "pose": ("whether frames say this about the pose of the camera", VERDICTS),
+}
+"""Help and values of what is one of several words."""
 
 
 class Histogram:
@@ -38,17 +46,19 @@ class Histogram:
 def to_prometheus_text(
     counters: Mapping[str, tuple[str, float]],
     gauges: Mapping[str, tuple[str, float]],
-    state: str,
+    words: Mapping[str, str],
     stages: Mapping[str, Histogram],
 ) -> str:
-    """Format all metrics. counters, gauges: help and value by name. stages: the histogram of each stage."""
+    """Format all metrics. counters, gauges: help and value by name. words: state and pose. stages: their histograms."""
     lines = []
     for kind, values in (("counter", counters), ("gauge", gauges)):
         for name, (help, value) in values.items():
             full = f"vm_{name}{'_total' if kind == 'counter' else ''}"
             lines += [f"# HELP {full} {help}", f"# TYPE {full} {kind}", f"{full} {value:.12g}"]
-    lines += ["# HELP vm_state whether the detector is in a state", "# TYPE vm_state gauge"]
-    lines += [f'vm_state{{state="{each}"}} {int(each == state)}' for each in STATES]
+    for name, word in words.items():
+        help, allowed = _LABELS[name]
+        lines += [f"# HELP vm_{name} {help}", f"# TYPE vm_{name} gauge"]
+        lines += [f'vm_{name}{{{name}="{each}"}} {int(each == word)}' for each in allowed]
     lines += ["# HELP vm_stage_seconds how long each stage of a frame takes", "# TYPE vm_stage_seconds histogram"]
     for stage, histogram in stages.items():
         lines += histogram.lines("vm_stage_seconds", f'stage="{stage}"')
