@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -97,8 +98,9 @@ def photo(options: argparse.Namespace) -> None:
         _write(options.output, views[0].lens, fit.orientation, lines)
     else:
         print("\n".join(lines))
-    given = f"--fov {options.fov}" if options.lens is None else f"--lens {options.lens}"
-    print(f"vm-detect {options.source} {given} {_pose_options(fit.orientation)}{_radius_option(options)}")
+    given = f"--fov {options.fov}" if options.lens is None else f"--lens {shlex.quote(str(options.lens))}"
+    pose, radius = _pose_options(fit.orientation), _radius_option(options)
+    print(f"vm-detect {shlex.quote(options.source)} {given} {pose}{radius}")
     _warn(field_warnings(fit))
 
 

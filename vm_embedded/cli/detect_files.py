@@ -154,8 +154,8 @@ class _Pass:
     """All that a pass over the frames needs.
 
     boxes, mcap, video: the files that the options ask for. remarks: collects what is strange. pose_check: collects what
-    the frames say about the pose. processed: number of
-    frames so far. replaced: the first remark about what a lens file replaces.
+    the frames say about the pose. processed: number of frames so far. replaced: the first remark about what a lens file
+    replaces.
     """
 
     detector: Detector

@@ -38,7 +38,7 @@ def _in_words(name: str, value: float) -> str:
 def _advice(errors: dict[str, float], fixed: Orientation | None) -> str:
     """What to do about errors [deg], [%]."""
     if fixed is None or not errors:
-        return "check mount and poses; vm-calibrate field finds the correction from a recording"
+        return "check mount and poses; vm-calibrate pose RECORDING --field finds the correction"
     tried = [f"--height {fixed.height * (1.0 + 0.01 * errors['height']):.2f}"] if "height" in errors else []
     angles = {"pitch": fixed.pitch, "roll": fixed.roll}
     tried += [f"--{name} {math.degrees(angles[name]) + errors[name]:.0f}deg" for name in angles if name in errors]

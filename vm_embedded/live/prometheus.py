@@ -49,7 +49,10 @@ def to_prometheus_text(
     words: Mapping[str, str],
     stages: Mapping[str, Histogram],
 ) -> str:
-    """Format all metrics. counters, gauges: help and value by name. words: state and pose. stages: their histograms."""
+    """Format all metrics.
+
+    counters, gauges: help and value by name. words: state and pose. stages: their histograms.
+    """
     lines = []
     for kind, values in (("counter", counters), ("gauge", gauges)):
         for name, (help, value) in values.items():

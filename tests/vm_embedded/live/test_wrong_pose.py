@@ -44,5 +44,6 @@ def test_a_pitch_that_is_six_degrees_off_is_reported(film, browser, tmp_path):
         browser.get(f"http://{where}/")
         wait(lambda: browser.find_element("id", "doubt").text == "pose wrong")
         wait(lambda: "pitch, roll off by" in browser.find_element("id", "runs").text)
+        wait(lambda: browser.execute_script("return document.getElementById('picture').naturalWidth") > 0)
         browser.save_screenshot(str(tmp_path / "page.png"))
         found.stop()
