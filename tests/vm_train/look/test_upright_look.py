@@ -107,8 +107,8 @@ def test_a_training_tells_each_class(together):
         assert re.fullmatch(rf"{name}: \d+ patches for training, \d+ of them with the object; for validation", first)
         assert re.fullmatch(found, second)
     score = r"[\d.]+ / [\d.]+ / [\d.]+"
-    expected = rf"epoch 4 of 4: validation AP of ball / goal / robot {score}, center error {score} radii, size error {score} %;.*"
-    assert re.fullmatch(expected, lines[11])
+    errors = f"center error {score} radii, size error {score} %"
+    assert re.match(rf"epoch 4 of 4: validation AP of ball / goal / robot {score}, {errors}; ", lines[11])
     for name, line in zip(("ball", "goal", "robot"), lines[12:15], strict=True):
         assert line.startswith(f"{folder / 'look.pt'}, {name}: in ")
 
@@ -125,7 +125,7 @@ def test_its_network_has_a_calibration_and_examples_of_each_class(together):
     assert list(results) == list(contract.names)
     assert made.network.calibration.numpy() == pytest.approx(np.array(fitted), rel=1e-5)
     assert {f"calibrated_on_{name}" for name in contract.names} <= contract.provenance.keys()
-    assert re.fullmatch(r"ball 0\.\d{4}, goal .*, robot .*", contract.provenance["validation_average_precision"])
+    assert re.fullmatch(r"ball [\d.]+, goal [\d.]+, robot [\d.]+", contract.provenance["validation_average_precision"])
 
 
 @pytest.mark.long
@@ -141,7 +141,6 @@ def test_a_trained_look_goes_into_a_model_file_and_runs_there(field, together):
     assert all(np.isfinite(each.position).all() for each in (*found.objects, *found.field.posts, *found.field.robots))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("name", "changes"), [("ball", {"ball": None}), ("robot", {"standing": STANDING[:3]})])
 def test_a_class_that_no_picture_shows_is_named(name, changes, field, tiny, tmp_path):
     folder = shutil.copytree(field, tmp_path / "field")
