@@ -7,7 +7,7 @@ from tests.vm_export.looks import look_checkpoint
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
-from vm_export.change_model import change_looks
+from vm_export.change_model import change_look
 from vm_train.data.pictures import find_pictures
 from vm_train.evaluation.answers import load_subject
 from vm_train.evaluation.evaluation import Rules, evaluate_pictures
@@ -30,7 +30,7 @@ def files(drawn):
 def looking(tmp_path_factory):
     """A model file with a close look of random weights."""
     path = tmp_path_factory.mktemp("looking") / "looking.onnx"
-    change_looks(model_path("ball"), path, [look_checkpoint(seed=1)])
+    change_look(model_path("ball"), path, look_checkpoint(seed=1))
     return path
 
 
@@ -54,7 +54,7 @@ def test_the_peaks_that_the_look_judges_are_the_proposals(files, looking, ball_c
     row = scores.row()
     assert row["truths"] == result.objects["ball"].ranking(0.5).truths
     assert row["recall_0.5"] > 0.8
-    assert max(scores.counts) <= read_model(looking).manifest.looks[0].max_proposals
+    assert max(scores.counts) <= read_model(looking).manifest.look.max_proposals
 
 
 @pytest.mark.parametrize("as_robot", [False, True])
