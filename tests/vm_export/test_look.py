@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from tests.looks import random_patches, upright
 from tests.vm_export.checkpoints import checkpoint
 from tests.vm_export.looks import SHAPE, look_checkpoint, look_network, torch_answers
+from vm_embedded.borders.text import MOST_NAME
 from vm_embedded.errors import InputError, ModelError
 from vm_export.checkpoint import Checkpoint
 from vm_export.eight_bits import round_kernels
@@ -324,6 +325,12 @@ def test_a_calibration_scales_how_much_the_score_of_its_class_counts():
     assert [each.mesh_weight for each in again.contract.classes] == [pytest.approx(0.2), 1.5]
     assert again.contract.provenance["calibrated_on_robot"] == "pictures"
     assert again.contract.provenance["calibrated_on_goal"] == "others"
+
+
+def test_a_class_with_the_longest_name_can_be_calibrated():
+    name = "x" * MOST_NAME
+    after = look_checkpoint(classes=(name,)).recalibrated(name, 2.0, 0.0, "a test")
+    assert list(after.contract.provenance.values()) == ["a test"]
 
 
 def test_a_look_of_the_usual_size_fits_its_sizes():
