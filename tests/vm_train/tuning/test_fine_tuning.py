@@ -92,6 +92,19 @@ def test_the_new_model_differs_only_in_its_close_look(whole):
 
 
 @pytest.mark.long
+def test_a_look_of_several_classes_still_judges_all_of_them(tune, tmp_path):
+    tune(tmp_path / "run", "--from", "soccer")
+    before, after = read_model(model_path("soccer")), read_model(tmp_path / "run" / "model.onnx")
+    assert after.manifest.look.names == ("ball", "goal", "robot")
+    assert after.manifest.look.classes == before.manifest.look.classes
+    size = after.manifest.look.size
+    patches = np.random.default_rng(0).integers(0, 256, (20, size, size, 3), np.uint8)
+    old, new = (CloseLook.of(each).run(patches) for each in (before, after))
+    assert np.isfinite(new).all()
+    assert (np.abs(new - old).max(axis=(0, 2)) > 1e-4).all()  # they share layers, so all change
+
+
+@pytest.mark.long
 def test_without_held_out_frames_nothing_is_measured_and_those_with_lenses_can_be_tried(tune, frames, tmp_path):
     seen = shutil.copytree(frames, tmp_path / "seen")
     lens = draw_set(tmp_path / "drawn", 1) / "lens0000.yaml"
