@@ -20,7 +20,7 @@ PAGE = DOCS / "own-object.md"
 PROGRAMS = tomllib.loads((TOP / "pyproject.toml").read_text())["project"]["scripts"]
 
 SETTINGS = {
-    "data/cups": ("training.epochs=2", "network.depth=1", "network.width=8"),
+    "data/cups": ("training.epochs=2", "training.repeats=40", "network.depth=1", "network.width=8"),
     "look": (
         "training.epochs=2",
         "training.rounds=1",
