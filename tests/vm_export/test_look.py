@@ -320,17 +320,17 @@ def test_a_calibration_scales_how_much_the_score_of_its_class_counts():
     assert after.network.calibration[0].tolist() == [scale, offset]
     assert after.network.calibration[1].tolist() == pytest.approx([3.0 * last[0], 3.0 * last[1] + 1.0])
     assert [each.mesh_weight for each in after.contract.classes] == [0.5, 1.5]
-    assert after.contract.provenance == {"trained_by": "a test", "calibrated_on_robot": "pictures"}
+    assert after.contract.provenance == {"trained_by": "a test"}
+    assert [each.calibrated_on for each in after.contract.classes] == ["", "pictures"]
     again = after.recalibrated("goal", 2.0, 0.0, "others", weight=0.1)
     assert [each.mesh_weight for each in again.contract.classes] == [pytest.approx(0.2), 1.5]
-    assert again.contract.provenance["calibrated_on_robot"] == "pictures"
-    assert again.contract.provenance["calibrated_on_goal"] == "others"
+    assert [each.calibrated_on for each in again.contract.classes] == ["others", "pictures"]
 
 
 def test_a_class_with_the_longest_name_can_be_calibrated():
     name = "x" * MOST_NAME
     after = look_checkpoint(classes=(name,)).recalibrated(name, 2.0, 0.0, "a test")
-    assert list(after.contract.provenance.values()) == ["a test"]
+    assert after.contract.classes[0].calibrated_on == "a test"
 
 
 def test_a_look_of_the_usual_size_fits_its_sizes():

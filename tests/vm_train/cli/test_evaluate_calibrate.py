@@ -50,7 +50,7 @@ def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp
     logits = [logits_from(each[:, 0].astype(np.float64)) for each in (first, second)]
     offset = logits[1][0] - scale * logits[0][0]
     np.testing.assert_allclose(logits[1], scale * logits[0] + offset, atol=0.05)  # the printed scale has two digits
-    assert re.fullmatch(r"\d+ answers in 60 pictures", new.manifest.look.provenance["calibrated_on_ball"])
+    assert re.fullmatch(r"\d+ answers in 60 pictures", new.manifest.look.classes[0].calibrated_on)
 
     assert calibrate(tmp_path / "once.onnx", data, "-o", tmp_path / "twice.onnx") == 0
     again = float(FITTED.search(capsys.readouterr().out)[4])
@@ -93,7 +93,7 @@ def test_each_class_gets_the_weight_and_the_calibration_that_suit_it(data, tmp_p
         fitted = Calibration.fit(logits_from(best.confidence), best.right)
         np.testing.assert_allclose(second[:, number], fitted.scale * first[:, number] + fitted.offset, atol=1e-3)
         assert new.manifest.look.classes[number].mesh_weight == pytest.approx(fitted.scale * weight)
-        assert new.manifest.look.provenance[f"calibrated_on_{name}"] == "60 answers in 60 pictures"
+        assert new.manifest.look.classes[number].calibrated_on == "60 answers in 60 pictures"
 
 
 @pytest.mark.long

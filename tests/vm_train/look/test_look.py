@@ -89,7 +89,7 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     assert (contract.extent, contract.max_proposals) == (1.75, 10)
     assert made.examples.shape == (4, 16, 16, 3)
     assert contract.provenance["data"] == drawn.name
-    assert re.fullmatch(rf"\d+ validation pictures of {drawn.name}", contract.provenance["calibrated_on_ball"])
+    assert re.fullmatch(rf"\d+ validation pictures of {drawn.name}", contract.classes[0].calibrated_on)
     assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["made_from"]["mesh.onnx"]
     for layer in (*made.network.typed_convolutions, made.network.hidden):
         kernel = layer.weight.detach().numpy()
