@@ -188,13 +188,14 @@ def plot(found: dict[str, Any]) -> None:
 def _look_data(look: LookContract) -> str:
     """The training data of a close look, for a card."""
     channels, made = ", ".join(map(str, look.channels)), look.provenance
-    calibrated = ", ".join(f"class {name} on {made[f'calibrated_on_{name}']}" for name in look.names)
+    calibrated = ", ".join(f"{each.name} on {each.calibrated_on}" for each in look.classes)
     text = (
         f"- **Close look at {', '.join(look.names)}:** {look.size} x {look.size} samples, convolutions of {channels} "
         f"channels. {made['training_pictures']} pictures of the same kind. Seed {made['seed']}, configuration "
-        f"`export/networks/look.toml`. Calibrated, {calibrated} (`python -m benchmarks.calibration_data`)."
+        f"`export/networks/look.toml`. Calibrated: {calibrated}"
     )
-    return textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False) + "\n"
+    filled = textwrap.fill(text, 120, subsequent_indent="  ", break_on_hyphens=False)
+    return f"{filled}\n  (`python -m benchmarks.calibration_data`).\n"
 
 
 def card(found: dict[str, Any], field: dict[str, Any], name: str) -> str:

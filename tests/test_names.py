@@ -34,7 +34,7 @@ from vm_train.learning.configuration import TrainConfiguration
 from vm_train.truth.objects import read_scene
 from vm_workstation.plots import new_figure, save_figure
 
-BALL = ball_manifest("ball", "other", mesh="octaves", peaks=("ball",), looks=(look_contract(),))
+BALL = ball_manifest("ball", "other", mesh="octaves", peaks=("ball",), look=look_contract())
 BOX = (20.0, 30.0, 40.0, 50.0)
 
 bad_names = pytest.mark.parametrize("name", BAD_NAMES, ids=lambda name: ascii(name)[:20])
@@ -49,9 +49,9 @@ def manifest_json(name, place):
     if place == "class":
         data["classes"][1]["name"] = name
     elif place == "look":
-        data["looks"][0]["object_class"] = name
+        data["look"]["classes"][0]["name"] = name
     else:
-        part = data["looks"][0] if place == "look's provenance" else data
+        part = data["look"] if place == "look's provenance" else data
         part["provenance"] = {name: "x"}
     return json.dumps(data)
 
@@ -64,7 +64,7 @@ def test_a_bad_name_in_a_manifest_is_refused_in_a_line(name, place):
     assert str(refused.value).isprintable()
     assert len(str(refused.value)) < 25_000
     if place == "look":
-        data = json.loads(manifest_json(name, place))["looks"][0]
+        data = json.loads(manifest_json(name, place))["look"]
         with pytest.raises(ModelError):
             LookContract.from_dict(data)
 
@@ -75,7 +75,7 @@ def test_a_bad_name_in_a_manifest_is_refused_in_a_line(name, place):
 @pytest.mark.parametrize("of_look", [False, True])
 def test_a_bad_text_in_a_provenance_is_refused(text, of_look):
     data = json.loads(BALL.as_json())
-    (data["looks"][0] if of_look else data)["provenance"] = {"made_from": text}
+    (data["look"] if of_look else data)["provenance"] = {"made_from": text}
     with pytest.raises(ModelError, match="made_from in the provenance"):
         Manifest.from_json(json.dumps(data))
 

@@ -56,8 +56,8 @@ class LookCheckpoint:
         kept = [number for number, name in enumerate(self.contract.names) if name in names]
         if not kept:
             raise ModelError(
-                f"the close look judges {', '.join(self.contract.names)}, but the classes are "
-                f"{', '.join(sorted(names)) or 'none'}"
+                f"the close look judges {', '.join(self.contract.names)}, but the network has peaks for "
+                f"{', '.join(sorted(names)) or 'no class'}"
             )
         network = LookNetwork(replace(self.network.shape, classes=len(kept)))
         answers = (torch.tensor(kept)[:, None] * len(ANSWERS) + torch.arange(len(ANSWERS))).flatten()
@@ -79,18 +79,15 @@ class LookCheckpoint:
         `scale * logit + offset`.
 
         weight: of the peak's score in that logit; None: the one that it has. source: the answers that the scale and the
-        offset fit, for the provenance.
+        offset fit.
         """
         network, number = copy.deepcopy(self.network), self.contract.names.index(name)
         first, before = network.calibration[number].tolist()
         network.calibration[number] = torch.tensor([scale * first, scale * before + offset])
         classes = list(self.contract.classes)
         old = classes[number].mesh_weight if weight is None else weight
-        classes[number] = replace(classes[number], mesh_weight=scale * old)
-        provenance = {**self.contract.provenance, f"calibrated_on_{name}": source}
-        return replace(
-            self, network=network, contract=replace(self.contract, provenance=provenance, classes=tuple(classes))
-        )
+        classes[number] = replace(classes[number], mesh_weight=scale * old, calibrated_on=source)
+        return replace(self, network=network, contract=replace(self.contract, classes=tuple(classes)))
 
     def save(self, path: str | Path) -> None:
         """Write the checkpoint. Raises InputError."""

@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 import torch
 
+from tests.looks import upright
 from tests.named_models import GOOD
 from tests.vm_embedded.live.running import DEMO
 from tests.vm_export.checkpoints import checkpoint, peak_checkpoint
@@ -29,6 +30,7 @@ from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.live.configuration import Configuration
 from vm_export.checkpoint import Checkpoint
 from vm_export.export import export
+from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.network_shape import NetworkShape
 from vm_train.learning.configuration import TrainConfiguration
 
@@ -234,11 +236,15 @@ def _small() -> Checkpoint:
     return checkpoint(shape=NetworkShape.uniform(2, 2, 2, neighbors=6))
 
 
+def _look() -> LookCheckpoint:
+    return look_checkpoint(classes=("ball", upright("goal")))
+
+
 def _saved(kind: str) -> bytes:
     """A checkpoint's file. torch aligns each tensor to 64 bytes, so that even small networks take kilobytes."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "model.pt"
-        (_small() if kind == "mesh" else look_checkpoint()).save(path)
+        (_small() if kind == "mesh" else _look()).save(path)
         return path.read_bytes()
 
 
@@ -260,7 +266,7 @@ def _models() -> dict[str, bytes]:
         path = Path(folder) / "model.onnx"
         export(_small(), path)
         made["graph"] = path.read_bytes()
-        export(peak_checkpoint(), path, [look_checkpoint()])
+        export(peak_checkpoint(classes=("ball", "goal:upright")), path, _look())
         made["look"] = path.read_bytes()
     return made
 

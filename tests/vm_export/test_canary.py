@@ -48,7 +48,7 @@ def test_the_networks_of_the_package_are_what_the_command_writes(tmp_path):
     done = vm_export("ball", "--canary", PACKAGE_PICTURE, LENS, "-o", output)
     assert done.returncode == 0, done.stderr
     again, shipped = read_model(output), read_model(model_path("ball"))
-    assert again.looks == shipped.looks
+    assert again.look == shipped.look
     assert again.canary == shipped.canary
 
 
@@ -71,7 +71,7 @@ def test_pictures_that_can_not_be_a_canary_are_refused(tmp_path):
 def test_a_look_that_finds_no_canary_gives_a_file_without_one_and_a_warning(tmp_path):
     look = look_checkpoint()
     with torch.no_grad():
-        look.network.calibration[1] = -20.0  # no patch shows a ball to it
+        look.network.calibration[:, 1] = -20.0  # no patch shows a ball to it
     look.save(tmp_path / "look.pt")
     output = tmp_path / "new.onnx"
     done = vm_export("ball", "--look", tmp_path / "look.pt", "-o", output)

@@ -52,4 +52,4 @@ def test_all_layers_but_the_answers_are_rounded():
     before = {name: value.clone() for name, value in network.state_dict().items()}
     round_kernels(network)
     changed = {name for name, value in network.state_dict().items() if not torch.equal(value, before[name])}
-    assert changed == {*(f"convolutions.{index}.weight" for index in range(5)), "hidden.weight"}
+    assert changed == {*(f"convolutions.{index}.weight" for index in range(6)), "hidden.weight"}

@@ -10,9 +10,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.looks import random_patches
+from tests.looks import random_patches, upright
 from tests.vm_export.checkpoints import checkpoint
 from tests.vm_export.looks import SHAPE, look_checkpoint, look_network, torch_answers
+from vm_embedded.borders.text import MOST_NAME
 from vm_embedded.errors import InputError, ModelError
 from vm_export.checkpoint import Checkpoint
 from vm_export.eight_bits import round_kernels
@@ -29,8 +30,13 @@ def onnx_answers(content, patches):
 
 widths = st.integers(1, 20)
 shapes = st.builds(
-    LookShape, size=st.integers(8, 40), channels=st.tuples(widths, widths, widths), hidden=st.integers(0, 20)
+    LookShape,
+    size=st.integers(8, 40),
+    channels=st.tuples(widths, widths, widths),
+    hidden=st.integers(0, 20),
+    classes=st.integers(1, 5),
 )
+SEVERAL = ("ball", upright("goal"), upright("robot"))
 
 
 @given(shape=shapes, seed=st.integers(0, 1000), count=st.integers(0, 9))
@@ -39,7 +45,7 @@ def test_every_look_gives_the_same_answers_in_onnx_runtime(shape, seed, count):
     network = look_network(seed, shape)
     patches = random_patches(count, shape.size, seed)
     answers = onnx_answers(look_model(network), patches)
-    assert answers.shape == (count, 4)
+    assert answers.shape == (count, shape.classes, 4)
     np.testing.assert_allclose(answers, torch_answers(network, patches), atol=1e-5)
 
 
@@ -67,7 +73,7 @@ def test_onnx_runtime_joins_convolutions_and_activations(tmp_path, rounded):
     onnxruntime.InferenceSession(look_model(network), options)
     operators = [node.op_type for node in onnx.load(tmp_path / "optimized.onnx").graph.node]
     assert "Relu" not in operators
-    assert sum("Conv" in each for each in operators) == 5
+    assert sum("Conv" in each for each in operators) == 6
     # Those of the patch's colors; the integers of the kernels are multiplied with their steps already.
     assert (operators.count("Cast"), operators.count("Mul")) == (1, 1)
 
@@ -115,22 +121,24 @@ def test_colors_as_floats_are_those_as_bytes():
     np.testing.assert_array_equal(torch_answers(network, patches.astype(np.float32)), torch_answers(network, patches))
 
 
-def test_calibration_changes_probabilities_only():
-    network, patches = look_network(), torch.from_numpy(random_patches(5))
+def test_calibration_changes_probabilities_of_its_class_only():
+    network, patches = look_network(shape=replace(SHAPE, classes=2)), torch.from_numpy(random_patches(5))
     with torch.inference_mode():
         logits = network.logits(patches)
-        network.calibration.copy_(torch.tensor([1.0, 0.0]))
+        network.calibration.copy_(torch.tensor([[1.0, 0.0], [1.0, 0.0]]))
         plain = network(patches)
-        network.calibration.copy_(torch.tensor([0.5, 1.0]))
+        network.calibration[1] = torch.tensor([0.5, 1.0])
         calibrated = network(patches)
-    torch.testing.assert_close(plain[:, 0], torch.sigmoid(logits[:, 0]))
-    torch.testing.assert_close(calibrated[:, 0], torch.sigmoid(0.5 * logits[:, 0] + 1.0))
+    torch.testing.assert_close(plain[..., 0], torch.sigmoid(logits[..., 0]))
+    torch.testing.assert_close(calibrated[:, 0], plain[:, 0])
+    torch.testing.assert_close(calibrated[:, 1, 0], torch.sigmoid(0.5 * logits[:, 1, 0] + 1.0))
     for answers in (plain, calibrated):
-        torch.testing.assert_close(answers[:, 1:], logits[:, 1:])
+        torch.testing.assert_close(answers[..., 1:], logits[..., 1:])
 
 
 def test_a_new_network_is_not_calibrated():
-    assert LookNetwork(LookShape()).calibration.tolist() == [1.0, 0.0]
+    assert LookNetwork(LookShape()).calibration.tolist() == [[1.0, 0.0]]
+    assert LookNetwork(LookShape(classes=2)).calibration.tolist() == [[1.0, 0.0], [1.0, 0.0]]
 
 
 def test_hidden_units_default_to_the_last_channels():
@@ -147,6 +155,8 @@ def test_hidden_units_default_to_the_last_channels():
         ({"channels": (4, 0, 5)}, r"not \[4, 0, 5\]"),
         ({"channels": (4, 5, 1025)}, "1 to 1024"),
         ({"hidden": -1}, "hidden .*not -1"),
+        ({"classes": 0}, "classes .* from 1 to 127, not 0"),
+        ({"classes": 128}, "not 128"),
     ],
 )
 def test_a_shape_out_of_range_is_refused(changes, message):
@@ -159,14 +169,22 @@ def test_a_shape_is_read_back_as_it_was_written(shape):
     assert LookShape.from_dict(shape.as_dict()) == shape
 
 
-@pytest.mark.parametrize("data", [{}, {"size": 8, "channels": 3, "hidden": 0}, {"size": 8, "channels": [1, 2]}])
+@pytest.mark.parametrize(
+    "data",
+    [
+        {},
+        {"size": 8, "channels": 3, "hidden": 0, "classes": 1},
+        {"size": 8, "channels": [1, 2]},
+        {"size": 8, "channels": [1, 2, 3], "hidden": 0},
+    ],
+)
 def test_a_shape_that_is_not_complete_is_refused(data):
     with pytest.raises(InputError, match="can't read the shape"):
         LookShape.from_dict(data)
 
 
 def test_a_checkpoint_is_read_back_as_it_was_written(tmp_path):
-    made = look_checkpoint(3, provenance={"trained_by": "a test"})
+    made = look_checkpoint(3, classes=SEVERAL, provenance={"trained_by": "a test"})
     made.save(tmp_path / "look.pt")
     torch.load(tmp_path / "look.pt", weights_only=True)
     read = LookCheckpoint.load(tmp_path / "look.pt")
@@ -186,7 +204,7 @@ def test_a_broken_checkpoint_is_refused(tmp_path, content):
 
 def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
     checkpoint().save(tmp_path / "model.pt")
-    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 4'.* 'vm-embedded checkpoint"):
+    with pytest.raises(InputError, match=r"model\.pt is not .* 'vm-embedded look 5'.* 'vm-embedded checkpoint"):
         LookCheckpoint.load(tmp_path / "model.pt")
     look_checkpoint().save(tmp_path / "look.pt")
     with pytest.raises(InputError, match=r"look\.pt is a close look; attach it to a network: vm-export MODEL --look"):
@@ -199,7 +217,8 @@ def test_a_checkpoint_of_another_kind_is_refused(tmp_path):
     ("entry", "value"),
     [
         ("network", {}),
-        ("network", {"size": 16, "channels": [4, 5, 6], "hidden": 0}),
+        ("network", {"size": 16, "channels": [4, 5, 6], "hidden": 0, "classes": 1}),
+        ("network", {"size": 8, "channels": [4, 5, 6], "hidden": 0, "classes": 2}),
         ("contract", {}),
         ("examples", torch.zeros(3, 8, 8, 3)),
         ("examples", None),
@@ -229,6 +248,89 @@ def test_examples_that_do_not_fit_are_refused(examples):
 def test_a_contract_for_another_network_is_refused(changes):
     with pytest.raises(ModelError, match="its contract says"):
         look_checkpoint(**changes)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_contract_with_other_classes_than_the_network_has_is_refused(count):
+    contract = look_checkpoint(classes=SEVERAL[:count]).contract
+    with pytest.raises(ModelError, match=r"judges 2 classes, but its contract has \['ball'"):
+        replace(look_checkpoint(classes=SEVERAL[:2]), contract=contract)
+
+
+@pytest.mark.parametrize(
+    ("names", "kept"),
+    [
+        (("ball", "goal", "robot"), [0, 1, 2]),
+        (["robot", "ball"], [0, 2]),
+        ({"goal": 1, "post": 2}, [1]),
+        ({"robot", "post"}, [2]),
+    ],
+    ids=str,
+)
+def test_a_part_of_a_look_gives_the_same_answers_for_its_classes(names, kept):
+    whole, patches = look_checkpoint(2, classes=SEVERAL), random_patches(9)
+    answers = torch_answers(whole.network, patches)
+    part = whole.part(names)
+    assert part.contract == replace(whole.contract, classes=tuple(whole.contract.classes[each] for each in kept))
+    assert part.network.shape == replace(whole.network.shape, classes=len(kept))
+    assert not part.network.training
+    np.testing.assert_allclose(torch_answers(part.network, patches), answers[:, kept], atol=1e-6)
+    np.testing.assert_allclose(onnx_answers(look_model(part.network), patches), answers[:, kept], atol=1e-5)
+    np.testing.assert_array_equal(part.examples, whole.examples)
+    with torch.no_grad():
+        part.network.hidden.weight.zero_()  # it is a network of its own
+    np.testing.assert_array_equal(torch_answers(whole.network, patches), answers)
+
+
+@pytest.mark.parametrize("names", [(), ("post",), ["Ball", "goals"]], ids=str)
+def test_a_part_of_a_look_has_a_class(names):
+    with pytest.raises(ModelError, match=r"judges ball, goal, robot, but "):
+        look_checkpoint(classes=SEVERAL).part(names)
+
+
+def test_a_weight_of_the_peaks_counts_for_each_class():
+    before = look_checkpoint(classes=("ball", upright("goal", mesh_weight=0.5)))
+    after = before.weighted(0.25)
+    assert [each.mesh_weight for each in after.contract.classes] == [0.25, 0.25]
+    assert [each.mesh_weight for each in before.contract.classes] == [0.0, 0.5]
+    assert after.weighted(0.0).contract == replace(
+        before.contract, classes=tuple(replace(each, mesh_weight=0.0) for each in before.contract.classes)
+    )
+    assert after.network is before.network
+
+
+def test_a_calibration_of_one_class_changes_its_probability_only():
+    before, patches = look_checkpoint(1, classes=SEVERAL), random_patches(9)
+    old = torch_answers(before.network, patches)
+    after = before.recalibrated("goal", 2.0, -0.5, "a test")
+    new = torch_answers(after.network, patches)
+    logits = np.log(old[:, 1, 0] / (1.0 - old[:, 1, 0]))
+    np.testing.assert_allclose(new[:, 1, 0], 1.0 / (1.0 + np.exp(0.5 - 2.0 * logits)), rtol=1e-4)
+    np.testing.assert_array_equal(new[..., 1:], old[..., 1:])
+    np.testing.assert_array_equal(new[:, [0, 2]], old[:, [0, 2]])
+    np.testing.assert_array_equal(torch_answers(before.network, patches), old)
+
+
+def test_a_calibration_scales_how_much_the_score_of_its_class_counts():
+    """That the logit with the score in it gets the scale and the offset."""
+    classes = tuple(upright(name, mesh_weight=0.5) for name in ("goal", "robot"))
+    look = look_checkpoint(classes=classes, provenance={"trained_by": "a test"})
+    after = look.recalibrated("robot", 3.0, 1.0, "pictures")
+    (scale, offset), last = look.network.calibration.tolist()
+    assert after.network.calibration[0].tolist() == [scale, offset]
+    assert after.network.calibration[1].tolist() == pytest.approx([3.0 * last[0], 3.0 * last[1] + 1.0])
+    assert [each.mesh_weight for each in after.contract.classes] == [0.5, 1.5]
+    assert after.contract.provenance == {"trained_by": "a test"}
+    assert [each.calibrated_on for each in after.contract.classes] == ["", "pictures"]
+    again = after.recalibrated("goal", 2.0, 0.0, "others", weight=0.1)
+    assert [each.mesh_weight for each in again.contract.classes] == [pytest.approx(0.2), 1.5]
+    assert [each.calibrated_on for each in again.contract.classes] == ["others", "pictures"]
+
+
+def test_a_class_with_the_longest_name_can_be_calibrated():
+    name = "x" * MOST_NAME
+    after = look_checkpoint(classes=(name,)).recalibrated(name, 2.0, 0.0, "a test")
+    assert after.contract.classes[0].calibrated_on == "a test"
 
 
 def test_a_look_of_the_usual_size_fits_its_sizes():

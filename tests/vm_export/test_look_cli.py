@@ -1,8 +1,8 @@
-"""vm-export with close looks, as a user types it."""
+"""vm-export with a close look, as a user types it."""
 
 import pytest
 
-from tests.looks import random_patches
+from tests.looks import random_patches, upright
 from tests.vm_export.checkpoints import peak_checkpoint
 from tests.vm_export.looks import look_checkpoint
 from tests.vm_export.test_cli import names_in, run
@@ -24,9 +24,8 @@ def folder(tmp_path):
 
 def has_look(path):
     """Whether a model file has a close look that runs and passes its self-test."""
-    read = read_model(path)
-    looks = CloseLook.of(read)
-    return "ball" in looks and len(looks["ball"].run(random_patches(2))) == 2
+    look = CloseLook.of(read_model(path))
+    return look is not None and len(look.run(random_patches(2))) == 2
 
 
 def test_command_attaches_a_look(folder):
@@ -40,14 +39,24 @@ def test_command_attaches_a_look(folder):
 def test_command_attaches_no_look_to_a_network_without_peaks(folder):
     reference_file(folder / "model.yaml")
     options = ("--look", folder / "look.pt", "--classes", "ball:object,field:area")
-    assert "the network has peaks for []" in run(folder / "model.yaml", *options, code=1).stderr
+    assert "the close look judges ball, but " in run(folder / "model.yaml", *options, code=1).stderr
 
 
-def test_command_takes_the_looks_of_another_model_file(folder):
+def test_command_takes_the_look_of_another_model_file(folder):
     run(folder / "model.pt", "--look", folder / "look.pt")
     done = run(folder / "model.pt", "--look", folder / "model.onnx", "-o", folder / "other.onnx")
     assert "close look at ball" in done.stdout
     assert has_look(folder / "other.onnx")
+
+
+def test_command_leaves_out_classes_without_peaks(folder):
+    look_checkpoint(classes=(upright("goal"), "ball", upright("robot"))).save(folder / "several.pt")
+    peak_checkpoint(classes=("ball", "goal:upright")).save(folder / "field.pt")
+    done = run(folder / "field.pt", "--look", folder / "several.pt")
+    assert "close look at goal, ball (8 x 8, channels 4, 5, 6)" in done.stdout
+    done = run(folder / "model.pt", "--look", folder / "field.onnx")
+    assert "close look at ball (8 x 8, channels 4, 5, 6)" in done.stdout
+    assert has_look(folder / "model.onnx")
 
 
 @pytest.mark.long
@@ -80,7 +89,7 @@ def test_command_attaches_a_look_to_a_model_file_and_removes_it(folder):
         (("given.onnx", "--look", "look.pt", "-o", "new.onnx", "--radius", "0"), "--radius can't change"),
         (("given.onnx", "--to-yaml", "--edge", "same", "--max-distance", "9"), "--to-yaml, --max-distance, --edge"),
         (("missing.onnx", "--look", "look.pt", "-o", "new.onnx"), "No such file"),
-        (("model.pt", "--look", "given.onnx"), "has close looks at nothing, but the classes are ball"),
+        (("model.pt", "--look", "given.onnx"), "given.onnx has no close look"),
         (("model.pt", "--look", "missing.onnx"), "No such file"),
         (("damaged.onnx", "--look", "look.pt", "-o", "new.onnx"), "damaged.onnx: not an ONNX file"),
         (("given.onnx", "--look", "look.pt", "-o", "no/such/new.onnx"), "can't write"),

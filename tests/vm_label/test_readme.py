@@ -54,4 +54,4 @@ def test_the_readme_leads_from_a_recording_to_a_tuned_network(tmp_path):
     networks = json.loads((tmp_path / "gain" / "scores.json").read_text())["networks"]
     assert [each["network"] for each in networks] == ["ball", "tuned/model.onnx"]
     assert networks[0]["scores"]["all"]["boxes"] == 4
-    assert read_model(tmp_path / "tuned" / "model.onnx").manifest.looks
+    assert read_model(tmp_path / "tuned" / "model.onnx").manifest.look is not None

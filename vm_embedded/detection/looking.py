@@ -139,6 +139,8 @@ def judge_peaks(
     look: the look network; it judges the classes that have a number. explain: also the rejected ones, with their
     reasons. watch: gets the stages propose, and with a look look. Raises ModelError if the look network does not run.
     """
+    if not sought:
+        return []
     watch.lap("propose")
     answers: dict[int, tuple[Singles, Floats]] = {}
     seen = [number for number, each in enumerate(sought) if each.number is not None and len(each.peaks)]
@@ -154,7 +156,7 @@ def judge_peaks(
             values = [each.peaks.probabilities, np.zeros((len(each.peaks), 2)), sizes]
             own = np.column_stack(values).astype(np.float32)
         judged.append(judged_places(each.view, centers, own, settings, explain))
-    if look is not None:
+    if any(each.number is not None for each in sought):
         watch.lap("look")
     return judged
 
@@ -185,7 +187,7 @@ def _looked(observation: Observation, sought: Sequence[Sought], look: Look) -> l
         second = look.run(np.ascontiguousarray(patches[:, :, ::-1]))[np.arange(len(doubtful)), numbers[doubtful]]
         rays[doubtful] += tangents.rays(-second[:, 1].astype(np.float64), second[:, 2].astype(np.float64))
         odds[doubtful] = 0.5 * (odds[doubtful] + _log_odds(second[:, 0]))
-        answers[doubtful, 3] = 0.5 * (answers[doubtful, 3] + second[:, 3])
+        answers[doubtful, 3] = 0.5 * answers[doubtful, 3] + 0.5 * second[:, 3]
         rays /= np.sqrt((rays * rays).sum(axis=1))[:, None]
     answers[:, 0] = probability_of(odds + seen)
     centers, ends = _centers(sought, of, rays), np.cumsum(counts)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from ..arrays import Chosen, Floats, Image, Number, Singles
+from ..arrays import Floats, Image, Number, Singles
 from ..network.look_contract import LookContract
 from .prepared_view import PreparedView
 from .pyramid import Pyramid
@@ -60,10 +60,6 @@ class Tangents:
         # The camera may be inside of the object, where no tangent exists.
         radius = size / np.sqrt(np.maximum(distance**2 - size**2, 1e-12))
         return cls(axes, right, down, radius)
-
-    def part(self, rows: Chosen | slice) -> Tangents:
-        """Some of the planes."""
-        return Tangents(self.axes[rows], self.right[rows], self.down[rows], self.radius[rows])
 
     def turned(self, rotation: Floats) -> Tangents:
         """The same planes in another frame; rotation (3, 3) maps that frame to this one."""

@@ -25,6 +25,7 @@ class JudgedClass:
         radius the manifest has.
     mesh_weight: how much the score of a peak of the mesh network counts beside the look's answer, 0 to 100: it is added
         so many times to the answer's log-odds.
+    calibrated_on: the answers that its probability fits, in words; the runtime does not use it.
 
     Raises ModelError for values out of range.
     """
@@ -32,12 +33,17 @@ class JudgedClass:
     name: str
     upright_radius: float = 0.0
     mesh_weight: float = 0.0
+    calibrated_on: str = ""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise ModelError(f"a class of the close look must be a name, not {self.name!r}")
         if fault := name_fault(self.name):
             raise ModelError(f"a class of the close look {fault}")
+        if not isinstance(self.calibrated_on, str) or (
+            self.calibrated_on and (fault := text_fault(self.calibrated_on))
+        ):
+            raise ModelError(f"calibrated_on of the close look must be a text, not {self.calibrated_on!r:.100}")
         for name in ("upright_radius", "mesh_weight"):
             check_number(f"{name} of the close look", getattr(self, name), 0.0, 100.0)
 

@@ -87,7 +87,7 @@ class LookTraining(Training):
             results[name] = replace(each, confidence=calibration.probabilities(each.confidence))
             values[name] = result_values(results[name], calibration)
             look = look.recalibrated(name, calibration.scale, calibration.offset, source)
-        provenance = self._provenance(self._scores(logits), results) | dict(look.contract.provenance)
+        provenance = self._provenance(self._scores(logits), results)
         replace(look, contract=replace(look.contract, provenance=provenance)).save(run.result_path)
         write_file(run.folder / "result.json", json.dumps(values, indent=1) + "\n")
         for name, result in results.items():

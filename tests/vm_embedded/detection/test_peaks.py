@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from tests.looks import look_contract
+from tests.looks import look_contract, upright
 from tests.manifests import ball_manifest
 from vm_embedded.arrays import frozen
 from vm_embedded.detection.cache import MeshCache
@@ -24,6 +24,7 @@ from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
 from vm_embedded.geometry.shapes import Circle, Sphere
 from vm_embedded.mesh.grids import STEPS, lattice_neighbors
 from vm_embedded.mesh.mesh import Mesh, rays_from_polar
+from vm_embedded.network.look_contract import JudgedClass
 
 from ..strategies import SIZE, reals, seeds
 from .peaked import answers_of, cells_to
@@ -290,28 +291,28 @@ def test_a_peak_of_an_upright_is_its_base(scene, seed):
     assume(is_near(view, cells, ray))
     size = random.uniform(-1.5, 1.5)
     seen = observed(view, manifest, [("goal", ray, size, 5.0)])
-    (base,) = uprights(seen, "goal", {}, SETTINGS)
+    (base,) = uprights(seen, "goal", None)
     place = place_of(view, ray)
     assert np.hypot(*(base.position - place)) < 0.012 * np.hypot(np.hypot(*place), view.height)
     assert base.width == pytest.approx(2.0 * manifest.radius * np.exp(size), rel=1e-5)
     (score,) = seen.peaks["goal"].scores
     assert base.confidence == pytest.approx(1.0 / (1.0 + np.exp(-score)))
-    features = locate_features(seen, judge_classes(seen, {}, SETTINGS, Stopwatch()))
+    features = locate_features(seen, judge_classes(seen, None, SETTINGS, Stopwatch()))
     (post,) = features.posts
     assert (post.class_name, post.width, post.confidence) == ("post", base.width, base.confidence)
     np.testing.assert_array_equal(post.position, base.position)
     assert features.robots == ()
 
 
-def uprights(seen, name, looks, settings=SETTINGS):
+def uprights(seen, name, look, settings=SETTINGS):
     """The posts or robots that are found."""
-    features = locate_features(seen, judge_classes(seen, looks, settings, Stopwatch()))
+    features = locate_features(seen, judge_classes(seen, look, settings, Stopwatch()))
     return {"goal": features.posts, "robot": features.robots}[name]
 
 
-def objects(seen, looks, explain=False):
+def objects(seen, look, explain=False):
     """The objects that are found, and the rejected ones."""
-    judged = judge_classes(seen, looks, SETTINGS, Stopwatch(), explain)
+    judged = judge_classes(seen, look, SETTINGS, Stopwatch(), explain)
     return locate(seen, judged, SETTINGS, Stopwatch(), explain)
 
 
@@ -327,9 +328,9 @@ def test_the_least_confidence_of_the_settings_counts_for_bases():
     near, far = VIEW.mesh.rays[cells_ahead(1.5, 4.0)]
     seen = observed(VIEW, BALLS, [("robot", far, 0.0, 1.0), ("robot", near, 0.0, -0.5)])
     for least, count in ((0.3, 2), (0.5, 1), (0.8, 0)):
-        found = uprights(seen, "robot", {}, Settings(min_confidence=least))
+        found = uprights(seen, "robot", None, Settings(min_confidence=least))
         assert len(found) == count
-    both = uprights(seen, "robot", {}, Settings(min_confidence=0.3))
+    both = uprights(seen, "robot", None, Settings(min_confidence=0.3))
     assert np.hypot(*both[0].position) < 2.0 < 3.0 < np.hypot(*both[1].position)
 
 
@@ -338,7 +339,7 @@ def test_two_peaks_of_a_wide_upright_are_one_base(width, is_same):
     rays = VIEW.mesh.rays[cells_ahead(2.0, 3.0)]
     size = np.log(width / (2.0 * BALLS.radius))
     seen = observed(VIEW, BALLS, [("robot", rays[0], size, 1.0), ("robot", rays[1], size, 4.0)])
-    found = uprights(seen, "robot", {}, SETTINGS)
+    found = uprights(seen, "robot", None)
     assert len(seen.peaks["robot"]) == 2
     assert len(found) == (1 if is_same else 2)
     assert max(each.confidence for each in found) == pytest.approx(1.0 / (1.0 + np.exp(-4.0)), abs=1e-4)
@@ -352,7 +353,7 @@ def test_a_peak_above_the_horizon_is_no_base():
     answers[[below, above], robot : robot + 4] = 2.0, 0.0, 0.0, 0.0
     seen = Observation(Pyramid(BLACK, "bgr"), view, BALLS, projected, answers)
     assert len(seen.peaks["robot"]) == 2
-    (base,) = uprights(seen, "robot", {})
+    (base,) = uprights(seen, "robot", None)
     np.testing.assert_allclose(base.position, place_of(view, view.mesh.rays[below]))
 
 
@@ -360,15 +361,27 @@ def test_a_peak_above_the_horizon_is_no_base():
 
 
 class Sure:
-    """A look that gives these answers to every patch."""
+    """A look that gives these answers for each class to every patch."""
 
-    def __init__(self, right=0.0, probability=0.9, down=0.0, **contract):
-        entries = {"object_class": "ball", "size": 16, "extent": 1.6}
-        self.contract = look_contract(**(entries | contract))
+    def __init__(self, right=0.0, probability=0.9, down=0.0, classes=("ball",), **contract):
+        self.contract = look_contract(*classes, **{"size": 16, "extent": 1.6} | contract)
         self._answer = np.array([probability, right, down, 0.0], dtype=np.float32)
 
     def run(self, patches):
-        return np.tile(self._answer, (len(patches), 1))
+        return np.tile(self._answer, (len(patches), len(self.contract.classes), 1))
+
+
+class ByClass(Sure):
+    """A look that gives each class answers of its own to every patch. It keeps how many patches it saw at once."""
+
+    def __init__(self, answers, **contract):
+        super().__init__(classes=tuple(each if each == "ball" else upright(each) for each in answers), **contract)
+        self._answers = np.array(list(answers.values()), dtype=np.float32)
+        self.seen = []
+
+    def run(self, patches):
+        self.seen.append(len(patches))
+        return np.tile(self._answers, (len(patches), 1, 1))
 
 
 def log_odds(probability):
@@ -377,17 +390,16 @@ def log_odds(probability):
 
 @given(reals(-3.0, 9.0), reals(0.0, 2.0), reals(0.01, 0.99), reals(-0.4, 0.4))
 def test_the_look_judges_peaks_and_the_score_counts_as_often_as_its_contract_says(score, weight, probability, right):
-    """Also where the look has moved the place."""
+    """Also where the look has moved the place. In doubt it moves it back in the mirrored second patch."""
     (cell,) = cells_ahead(2.0)
     ray = VIEW.mesh.rays[cell]
-    seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score)])
-    look = Sure(right, probability, mesh_weight=weight)
-    ((_, (judged,)),) = judge_classes(
-        seen, {"ball": look}, SETTINGS, Stopwatch(), explain=True, uprights=False
-    ).values()
-    moved = offset(VIEW, judged.center / np.linalg.norm(judged.center), ray)
-    assert moved == pytest.approx(abs(right), abs=0.02)
     expected = log_odds(np.float64(np.float32(probability))) + weight * score
+    assume(abs(abs(expected) - 3.0) > 1e-3)
+    seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score)])
+    look = Sure(right, probability, classes=(JudgedClass(name="ball", mesh_weight=weight),))
+    ((_, (judged,)),) = judge_classes(seen, look, SETTINGS, Stopwatch(), explain=True, uprights=False).values()
+    moved = offset(VIEW, judged.center / np.linalg.norm(judged.center), ray)
+    assert moved == pytest.approx(abs(right) * (1.0 if abs(expected) > 3.0 else 0.5), abs=0.02)
     assert judged.confidence == pytest.approx(min(1.0 / (1.0 + np.exp(-expected)), 1.0 - 1e-6), abs=2e-6)
     assert (judged.reason is None) == (judged.confidence >= SETTINGS.min_confidence)
 
@@ -396,8 +408,7 @@ def test_each_place_keeps_the_score_of_its_own_peak():
     rays = VIEW.mesh.rays[cells_ahead(1.2, 2.5, 5.0)]
     scores = (1.0, 3.0, 2.0)
     seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score) for ray, score in zip(rays, scores, strict=True)])
-    look = Sure(0.2, 0.5, mesh_weight=0.5)
-    found, _ = objects(seen, {"ball": look})
+    found, _ = objects(seen, Sure(0.2, 0.5, classes=(JudgedClass(name="ball", mesh_weight=0.5),)))
     assert len(found) == 3
     assert found[2].distance < found[0].distance < found[1].distance
     for each, score in zip(found, (3.0, 2.0, 1.0), strict=True):
@@ -407,9 +418,50 @@ def test_each_place_keeps_the_score_of_its_own_peak():
 def test_a_look_judges_the_best_peaks():
     rays = VIEW.mesh.rays[cells_ahead(1.2, 2.5, 5.0)]
     seen = observed(VIEW, BALLS, [("ball", ray, 0.0, score) for ray, score in zip(rays, (1.0, 3.0, 2.0), strict=True)])
-    found, _ = objects(seen, {"ball": Sure(max_proposals=2)})
+    found, _ = objects(seen, Sure(max_proposals=2))
     assert len(found) == 2
     assert min(each.distance for each in found) > 2.0  # not the nearest, whose score is the lowest
+
+
+def test_one_look_judges_each_class_by_its_own_answers():
+    """The peaks of a class that it does not judge are the objects."""
+    rays = VIEW.mesh.rays[cells_ahead(1.2, 2.5, 5.0)]
+    rows = [(name, ray, 0.0, 1.0) for name, ray in zip(NAMES, rays, strict=True)]
+    seen = observed(VIEW, BALLS, rows)
+    look = ByClass({"goal": (0.99, 0.5, 0.0, 0.2), "ball": (0.97, 0.0, 0.0, -0.1)})
+    judged = judge_classes(seen, look, SETTINGS, Stopwatch())
+    assert look.seen == [2]
+    assert {name: of.number for name, (of, _) in judged.items()} == {"ball": 1, "goal": 0, "robot": None}
+    (ball,), (goal,), (robot,) = (judged[name][1] for name in NAMES)
+    assert (ball.confidence, goal.confidence) == (pytest.approx(0.97), pytest.approx(0.99))
+    assert robot.confidence == pytest.approx(1.0 / (1.0 + np.exp(-1.0)), abs=1e-3)
+    assert np.log([ball.scale, goal.scale]) == pytest.approx([-0.1, 0.2], abs=1e-6)
+    for each, ray in zip((ball, robot), rays[[0, 2]], strict=True):
+        np.testing.assert_allclose(each.center / np.linalg.norm(each.center), ray, atol=1e-3)
+    moved = goal.center - rays[1] * (VIEW.height / -rays[1][2])
+    assert np.linalg.norm(moved) == pytest.approx(0.5 * 0.3, abs=0.03)
+
+
+def test_a_look_judges_the_best_peaks_of_each_class():
+    rays = VIEW.mesh.rays[cells_ahead(1.2, 2.5, 5.0)]
+    rows = [
+        (name, ray, 0.0, score) for name in ("ball", "goal") for ray, score in zip(rays, (1.0, 3.0, 2.0), strict=True)
+    ]
+    look = ByClass({"ball": (0.99, 0.0, 0.0, 0.0), "goal": (0.98, 0.0, 0.0, 0.0)}, max_proposals=2)
+    judged = judge_classes(observed(VIEW, BALLS, rows), look, SETTINGS, Stopwatch())
+    assert look.seen == [4]
+    for name, confidence in (("ball", 0.99), ("goal", 0.98)):
+        found = judged[name][1]
+        assert [each.confidence for each in found] == pytest.approx([confidence] * 2)
+        assert min(np.linalg.norm(each.center) for each in found) > 2.0  # not the nearest, whose score is the lowest
+
+
+def test_a_look_without_peaks_of_its_classes_is_not_run():
+    (ray,) = VIEW.mesh.rays[cells_ahead(2.0)]
+    look = ByClass({"goal": (0.99, 0.0, 0.0, 0.0)})
+    (found,), _ = objects(observed(VIEW, BALLS, [("ball", ray, 0.0, 1.0)]), look)
+    assert found.confidence == pytest.approx(1.0 / (1.0 + np.exp(-1.0)), abs=1e-3)
+    assert look.seen == []
 
 
 def test_without_a_look_the_peaks_are_the_objects():
@@ -420,7 +472,7 @@ def test_without_a_look_the_peaks_are_the_objects():
     for larger in (1.0, 1.5):
         balls = replace(BALLS, object_radius=larger * BALLS.radius)
         seen = observed(VIEW._replace(shape=balls.object_shape), balls, rows)
-        found, rejected = objects(seen, {}, explain=True)
+        found, rejected = objects(seen, None, explain=True)
         assert [each.confidence for each in found] == pytest.approx([0.9526, 0.7311], abs=1e-3)
         for each, ray, size in zip(found, rays[[1, 0]], (0.1, 0.0), strict=True):
             assert offset(VIEW, VIEW.heading.T @ each.bearing, ray) < 0.01
@@ -432,23 +484,24 @@ def test_without_a_look_the_peaks_are_the_objects():
 def test_a_look_at_uprights_judges_their_peaks():
     (cell,) = cells_ahead(2.0)
     seen = observed(VIEW, BALLS, [("goal", VIEW.mesh.rays[cell], 0.0, 3.0)])
-    look = Sure(object_class="goal", upright_radius=0.3)
-    (base,) = uprights(seen, "goal", {"goal": look})
+    look = Sure(classes=(upright("goal"),))
+    (base,) = uprights(seen, "goal", look)
     np.testing.assert_allclose(base.position, place_of(VIEW, VIEW.mesh.rays[cell]), atol=1e-3)
     assert base.width == pytest.approx(0.6)
-    (post,) = locate_features(seen, judge_classes(seen, {"goal": look}, SETTINGS, Stopwatch())).posts
+    (post,) = locate_features(seen, judge_classes(seen, look, SETTINGS, Stopwatch())).posts
     assert post.confidence == pytest.approx(0.9)
 
 
-def test_a_base_moves_as_its_look_says_and_a_doubtful_look_reports_nothing():
+def test_a_base_moves_as_its_look_says_and_an_improbable_one_is_not_reported():
     (cell,) = cells_ahead(2.0)
     seen = observed(VIEW, BALLS, [("goal", VIEW.mesh.rays[cell], 0.0, 3.0)])
 
-    def found(**answers):
-        look = Sure(object_class="goal", upright_radius=0.3, **answers)
-        return [VIEW.heading.T[:2, :2] @ each.position for each in uprights(seen, "goal", {"goal": look})]
+    def found(probability=0.99, **shift):
+        look = Sure(probability=probability, classes=(upright("goal"),), **shift)
+        return [VIEW.heading.T[:2, :2] @ each.position for each in uprights(seen, "goal", look)]
 
     (still,), (right,), (down,) = found(), found(right=0.5), found(down=0.2)
     assert (right - still)[1] == pytest.approx(-0.15, abs=0.03)  # y is to the left
     assert np.hypot(*down) < np.hypot(*still) - 0.05  # lower in the picture is nearer
     assert found(probability=0.25) == []
+    assert found(probability=0.01) == []

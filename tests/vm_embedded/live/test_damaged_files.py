@@ -14,7 +14,7 @@ from vm_embedded.detection.detector import Detector
 from vm_embedded.errors import VisualMeshError
 from vm_embedded.live.configuration import Configuration, read_configuration
 from vm_embedded.network.bundled import model_path
-from vm_export.change_model import change_looks
+from vm_export.change_model import change_look
 
 WORDS = ["nan", "inf", "-1", "1e400", "true", '"x"', "[]", "{}", "[1, 2]", "'''", "\\u0000", "9" * 400, "1979-05-27"]
 
@@ -69,7 +69,7 @@ def test_ten_thousand_damaged_configurations_are_read_or_refused_in_a_line(tmp_p
 def test_ten_thousand_damaged_models_are_loaded_or_refused_in_a_line(tmp_path):
     chance = random.Random(2)
     path = tmp_path / "damaged.onnx"
-    change_looks(model_path("ball"), path, [look_checkpoint()])  # a small look, so that damage hits all parts
+    change_look(model_path("ball"), path, look_checkpoint())  # a small look, so that damage hits all parts
     whole = path.read_bytes()
     outcomes = []
     started = time.monotonic()

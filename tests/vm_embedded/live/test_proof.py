@@ -8,7 +8,7 @@ import pytest
 from tests.fixtures.make_drawn import FOLDER
 from vm_embedded.errors import ModelError
 from vm_embedded.live.proof import prove
-from vm_embedded.network.bundled import model_path
+from vm_embedded.network.bundled import SHIPPED, model_path
 from vm_embedded.network.example import SelfTest
 from vm_embedded.network.look_example import LookTest
 from vm_embedded.network.model_file import read_model
@@ -30,29 +30,20 @@ def test_without_a_canary_the_self_tests_are_the_proof(ball):
 
 
 @pytest.mark.parametrize("empty", [False, True], ids=["none", "empty"])
-@pytest.mark.parametrize("part", ["mesh network", "close look at ball"])
-def test_a_model_without_a_self_test_is_refused(ball, part, empty):
-    manifest = ball.manifest
-    (look,) = manifest.looks
-    test = manifest.self_test
+@pytest.mark.parametrize("part", ["mesh network", "close look"])
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_model_without_a_self_test_is_refused(name, part, empty):
+    model = read_model(model_path(name))
+    manifest = model.manifest
+    look, test = manifest.look, manifest.self_test
     no_points = SelfTest(test.points[-1:], np.zeros_like(test.neighbors[-1:]), test.probabilities[-1:])
     no_patches = LookTest(look.self_test.patches[:0], look.self_test.answers[:0])
     without = {
         "mesh network": replace(manifest, self_test=no_points if empty else None),
-        "close look at ball": replace(manifest, looks=(replace(look, self_test=no_patches if empty else None),)),
+        "close look": replace(manifest, look=replace(look, self_test=no_patches if empty else None)),
     }
     with pytest.raises(ModelError, match=f"its {part} has no self-test"):
-        prove(replace(ball, manifest=without[part]))
-
-
-@pytest.mark.parametrize("number", [1, 2])
-def test_a_model_without_a_self_test_of_a_look_at_uprights_is_refused(number):
-    soccer = read_model(model_path("soccer"))
-    looks = list(soccer.manifest.looks)
-    looks[number] = replace(looks[number], self_test=None)
-    untested = replace(soccer, manifest=replace(soccer.manifest, looks=tuple(looks)))
-    with pytest.raises(ModelError, match=f"its close look at {looks[number].object_class} has no self-test"):
-        prove(untested)
+        prove(replace(model, manifest=without[part]))
 
 
 def wrong(canary, **changes):

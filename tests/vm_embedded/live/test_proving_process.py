@@ -39,7 +39,7 @@ def test_a_good_model_is_proved():
     assert proved(BALL).startswith("self-test passed, canary found (1 ball, ")
 
 
-@pytest.mark.parametrize("content", [b"", b"no model", BALL[:100_000], BALL[:-1]])
+@pytest.mark.parametrize("content", [b"", b"no model", BALL[: len(BALL) // 2], BALL[:-1]])
 def test_a_damaged_model_is_refused_with_the_reason(content):
     with pytest.raises(ModelError, match=r"model\.onnx: "):
         proved(content)

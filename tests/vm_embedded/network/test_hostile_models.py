@@ -15,7 +15,7 @@ from onnx import TensorProto, helper, numpy_helper
 from tests.vm_embedded.cli.commands import one_complaint, run
 from vm_embedded.errors import ModelError
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.look_contract import look_key
+from vm_embedded.network.look_contract import LOOK_KEY
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
 from vm_embedded.network.onnx_model import OnnxModel
 
@@ -194,7 +194,7 @@ def weights_of(model, key):
 
 
 @pytest.mark.parametrize("value", [0.0, math.nan, None], ids=["zero", "NaN", "random"])
-@pytest.mark.parametrize("key", [None, look_key("ball")])
+@pytest.mark.parametrize("key", [None, LOOK_KEY])
 def test_attack_1_a_network_with_other_weights_is_refused_by_vm_detect(key, value, tmp_path):
     made = ball()
     network, store = weights_of(made, key)

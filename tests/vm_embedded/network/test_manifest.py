@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.looks import look_contract
+from tests.looks import look_contract, upright
 from tests.manifests import ball_manifest
 from vm_embedded.errors import GeometryError, InputError, ModelError
 from vm_embedded.geometry.shapes import SHAPES, Circle, Sphere
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.example import SelfTest
+from vm_embedded.network.look_contract import JudgedClass
 from vm_embedded.network.manifest import (
     EDGES,
     FORMAT_VERSION,
@@ -354,38 +355,49 @@ def test_a_manifest_for_a_camera_below_the_ball_has_no_spacing():
         BALL.mesh_shape.spacing(0.15)
 
 
-def upright_look(name="goal", **changes):
-    return look_contract(**{"object_class": name, "upright_radius": 0.3} | changes)
-
-
-def test_looks_round_trip():
-    manifest = replace(STRIPS, peaks=("ball", "goal"), looks=(look_contract(mesh_weight=0.4), upright_look()))
+def test_a_look_round_trips():
+    look = look_contract(JudgedClass(name="ball", mesh_weight=0.4), upright("goal"))
+    manifest = replace(STRIPS, peaks=("ball", "goal"), look=look)
     assert Manifest.from_json(manifest.as_json()) == manifest
 
 
+@pytest.mark.parametrize("names", [("ball",), ("goal",), ("goal", "ball")])
+def test_a_look_may_judge_some_classes_in_any_order(names):
+    judged = {"ball": "ball", "goal": upright("goal")}
+    manifest = replace(STRIPS, peaks=("ball", "goal"), look=look_contract(*(judged[name] for name in names)))
+    assert manifest.look.names == names
+    assert manifest.searched_class == ("ball" if "ball" in names else None)
+
+
+def test_without_a_look_no_class_is_searched():
+    assert replace(STRIPS, peaks=("ball", "goal")).searched_class is None
+
+
 @pytest.mark.parametrize(
-    ("look", "message"),
+    ("judged", "message"),
     [
-        (upright_look("line"), r"\['line'\], but the network has peaks for \['ball', 'goal'\]"),
-        (upright_look(upright_radius=0.0), "upright_radius of at least 0.01 m, not 0 m"),
-        (upright_look(upright_radius=1e-300), "upright_radius of at least 0.01 m"),
-        (look_contract(upright_radius=0.3), "it must be 0"),
+        (upright("line"), r"judges 'line', but the network has peaks for \['ball', 'goal'\]"),
+        (upright("goal", 0.0), "upright_radius of at least 0.01 m for 'goal', not 0 m"),
+        (upright("goal", 1e-300), "upright_radius of at least 0.01 m for 'goal'"),
+        (upright("ball"), "upright_radius of 0.3 m for 'ball'.*it must be 0"),
     ],
 )
-def test_looks_that_make_no_sense_are_refused(look, message):
+@pytest.mark.parametrize("is_first", [True, False])
+def test_a_look_that_makes_no_sense_is_refused(judged, message, is_first):
+    other = "ball" if judged.name != "ball" else upright("goal")
+    classes = (judged, other) if is_first else (other, judged)
     with pytest.raises(ModelError, match=message):
-        replace(STRIPS, peaks=("ball", "goal"), looks=(look,))
+        replace(STRIPS, peaks=("ball", "goal"), look=look_contract(*classes))
 
 
-def test_two_looks_at_a_class_are_refused():
-    with pytest.raises(ModelError, match=r"\['goal', 'goal'\]"):
-        replace(STRIPS, peaks=("ball", "goal"), looks=(upright_look(), upright_look()))
+@pytest.mark.parametrize("wrong", [[], {}, 3, 0, False, "goal"])
+def test_a_look_that_is_no_table_is_refused(wrong):
+    with pytest.raises(ModelError, match="look"):
+        Manifest.from_json(changed(look=wrong))
 
 
-@pytest.mark.parametrize("wrong", [None, {}, 3, "goal"])
-def test_looks_that_are_no_list_are_refused(wrong):
-    with pytest.raises(ModelError, match="looks"):
-        Manifest.from_json(changed(looks=wrong))
+def test_a_manifest_without_a_look_has_none():
+    assert Manifest.from_json(changed(look=None)).look is None
 
 
 def test_operations_beyond_all_networks_are_refused():

@@ -18,7 +18,7 @@ from tests.looks import look_contract
 from tests.programs import BIN, heed_interrupts, run_program
 from tests.vm_export.looks import look_checkpoint
 from vm_embedded.network.bundled import model_path
-from vm_export.change_model import change_looks
+from vm_export.change_model import change_look
 from vm_export.checkpoint import Checkpoint
 from vm_export.grid import Grid
 from vm_train.cli.evaluate import main
@@ -103,7 +103,7 @@ def test_calibration_counts_all_objects_that_the_scores_count(evaluated):
 def looking(tmp_path_factory):
     """A model file with a close look of random weights."""
     path = tmp_path_factory.mktemp("looking") / "looking.onnx"
-    change_looks(model_path("ball"), path, [look_checkpoint(seed=1)])
+    change_look(model_path("ball"), path, look_checkpoint(seed=1))
     return path
 
 

@@ -8,14 +8,17 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.looks import random_patches
+from tests.looks import random_patches, upright
+from tests.vm_export.looks import look_checkpoint
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import CloseLook
-from vm_export.change_model import change_looks
-from vm_export.look_weights import looks_of
+from vm_export.change_model import change_look
+from vm_export.look_weights import look_of
+from vm_train.cli import evaluate_calibrate
 from vm_train.cli.evaluate import main
 from vm_train.scores.calibration import Calibration, logits_from
+from vm_train.scores.object_ranking import Ranking
 
 from ...drawn_scenes import MODEL
 from ..drawn import draw_set
@@ -35,26 +38,62 @@ def calibrate(*arguments):
 @pytest.mark.long
 def test_the_confidence_fits_the_pictures_afterward_and_all_else_stays(data, tmp_path, capsys):
     shipped = model_path("ball")
-    change_looks(
-        shipped,
-        tmp_path / "unsure.onnx",
-        [each.recalibrated(0.6, 0.3, "no picture") for each in looks_of(read_model(shipped))],
-    )
+    unsure = look_of(read_model(shipped)).recalibrated("ball", 0.6, 0.3, "no picture")
+    change_look(shipped, tmp_path / "unsure.onnx", unsure)
     assert calibrate(tmp_path / "unsure.onnx", data, "-o", tmp_path / "once.onnx") == 0
     _, before, after, scale = map(float, FITTED.search(capsys.readouterr().out).groups())
     assert after < before
     old, new = (read_model(tmp_path / f"{name}.onnx") for name in ("unsure", "once"))
-    patches = random_patches(20, old.manifest.looks[0].size)
-    first, second = (CloseLook.of(each)["ball"].run(patches) for each in (old, new))
+    patches = random_patches(20, old.manifest.look.size)
+    first, second = (CloseLook.of(each).run(patches)[:, 0] for each in (old, new))
     np.testing.assert_allclose(second[:, 1:], first[:, 1:], atol=1e-6)
     logits = [logits_from(each[:, 0].astype(np.float64)) for each in (first, second)]
     offset = logits[1][0] - scale * logits[0][0]
     np.testing.assert_allclose(logits[1], scale * logits[0] + offset, atol=0.05)  # the printed scale has two digits
-    assert re.fullmatch(r"\d+ answers in 60 pictures", new.manifest.looks[0].provenance["calibrated_on"])
+    assert re.fullmatch(r"\d+ answers in 60 pictures", new.manifest.look.classes[0].calibrated_on)
 
     assert calibrate(tmp_path / "once.onnx", data, "-o", tmp_path / "twice.onnx") == 0
     again = float(FITTED.search(capsys.readouterr().out)[4])
     assert again == pytest.approx(1.0, abs=0.1)
+
+
+BEST = {"ball": 0.8, "goal": 0.0, "robot": 1.6}
+"""The weight of the scores of peaks with which each class is ranked best, in the test below."""
+
+
+def ranking(name, weight):
+    """What is found of a class with a weight: the nearer that is to the best one, the fewer of the surest are wrong."""
+    wrong = round(10 * abs(weight - BEST[name]))
+    right = np.array([False] * wrong + [True] * 20 + [False] * (40 - wrong))
+    right[[1, 50]] = True
+    confidence = np.linspace(0.95, 0.05, 60) ** (1 + list(BEST).index(name))
+    return Ranking(confidence=confidence, right=right, truths=25, pictures=60)
+
+
+class Found:
+    """An evaluation of a model file that finds that."""
+
+    poses = range(60)
+
+    def __init__(self, job, *_):
+        self.weights = {each.name: each.mesh_weight for each in read_model(job.model).manifest.look.classes}
+
+
+def test_each_class_gets_the_weight_and_the_calibration_that_suit_it(data, tmp_path, monkeypatch):
+    monkeypatch.setattr(evaluate_calibrate, "evaluate_with_progress", Found)
+    monkeypatch.setattr(evaluate_calibrate, "_ranking", lambda result, name: ranking(name, result.weights[name]))
+    before, after = tmp_path / "before.onnx", tmp_path / "after.onnx"
+    change_look(model_path("soccer"), before, look_checkpoint(classes=("ball", upright("goal"), upright("robot"))))
+    assert calibrate(before, data, "-o", after) == 0
+    old, new = (read_model(path) for path in (before, after))
+    patches = random_patches(20)
+    first, second = (logits_from(CloseLook.of(each).run(patches)[..., 0].astype(np.float64)) for each in (old, new))
+    for number, (name, weight) in enumerate(BEST.items()):
+        best = ranking(name, weight)
+        fitted = Calibration.fit(logits_from(best.confidence), best.right)
+        np.testing.assert_allclose(second[:, number], fitted.scale * first[:, number] + fitted.offset, atol=1e-3)
+        assert new.manifest.look.classes[number].mesh_weight == pytest.approx(fitted.scale * weight)
+        assert new.manifest.look.classes[number].calibrated_on == "60 answers in 60 pictures"
 
 
 @pytest.mark.long

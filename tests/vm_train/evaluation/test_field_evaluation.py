@@ -42,7 +42,7 @@ class Reporting:
     sha256 = ""
 
     def __init__(self, reported, manifest=MANIFEST, grid="visual"):
-        self.reported, self.manifest, self.grid, self.looks = reported, manifest, Grid(grid), {}
+        self.reported, self.manifest, self.grid, self.look = reported, manifest, Grid(grid), None
 
     def answer(self, picture, radius=None):
         none = np.zeros((0, len(self.manifest.classes)), dtype=np.float32)

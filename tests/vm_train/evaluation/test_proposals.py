@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
+from tests.looks import upright
 from tests.vm_export.looks import look_checkpoint
 from vm_embedded.detection.settings import Settings
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
-from vm_export.change_model import change_looks
+from vm_export.change_model import change_look
 from vm_train.data.pictures import find_pictures
 from vm_train.evaluation.answers import load_subject
-from vm_train.evaluation.evaluation import Rules, evaluate_pictures
+from vm_train.evaluation.evaluation import Evaluation, Rules, evaluate_pictures
 from vm_train.evaluation.mask_colors import classes_with_colors, default_colors
 from vm_train.evaluation.tables import as_csv, as_json
 from vm_train.evaluation.workers import Job, evaluate
@@ -30,7 +31,7 @@ def files(drawn):
 def looking(tmp_path_factory):
     """A model file with a close look of random weights."""
     path = tmp_path_factory.mktemp("looking") / "looking.onnx"
-    change_looks(model_path("ball"), path, [look_checkpoint(seed=1)])
+    change_look(model_path("ball"), path, look_checkpoint(seed=1))
     return path
 
 
@@ -54,7 +55,7 @@ def test_the_peaks_that_the_look_judges_are_the_proposals(files, looking, ball_c
     row = scores.row()
     assert row["truths"] == result.objects["ball"].ranking(0.5).truths
     assert row["recall_0.5"] > 0.8
-    assert max(scores.counts) <= read_model(looking).manifest.looks[0].max_proposals
+    assert max(scores.counts) <= read_model(looking).manifest.look.max_proposals
 
 
 @pytest.mark.parametrize("as_robot", [False, True])
@@ -65,6 +66,19 @@ def test_proposals_are_in_the_frame_of_the_found_objects(looking, as_robot):
         positions = centers + np.array([0.0, 0.0, picture.lens.orientation.height])
         nearest = np.linalg.norm(positions - scene.objects[0].center, axis=1).min()
         assert nearest < 0.1 * np.linalg.norm(scene.objects[0].center)
+
+
+@pytest.mark.parametrize("as_robot", [False, True])
+def test_only_objects_have_proposals_also_if_the_look_judges_uprights(tmp_path, as_robot):
+    path = tmp_path / "looking.onnx"
+    judged = ("ball", upright("goal"), upright("robot"))
+    change_look(model_path("soccer"), path, look_checkpoint(classes=judged, max_proposals=7))
+    subject = load_subject(path, Settings(), as_robot)
+    assert list(Evaluation.empty(subject).proposals) == ["ball"]
+    for picture, _ in drawn_pictures():
+        found = subject.answer(picture).proposals
+        assert list(found) == ["ball"]
+        assert len(found["ball"]) <= 7
 
 
 def test_parts_with_proposals_add_up_in_any_number_of_processes(files, looking, ball_classes):

@@ -25,7 +25,7 @@ from vm_embedded.geometry.shapes import Cylinder, Sphere
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint
-from vm_export.look_weights import looks_of
+from vm_export.look_weights import look_of
 from vm_train.boxes.box import Box, BoxedPicture
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.import_boxes import import_boxes_parser, run_import_boxes
@@ -304,12 +304,12 @@ def test_a_network_of_the_package_is_fine_tuned_as_a_user_types_it(frames, tmp_p
     split = json.loads((folder / "pictures.json").read_text())
     assert split["validation"] == [f"sunday_image000{number}" for number in range(4)]
 
-    looks_of(read_model(model_path("ball")))[0].save(tmp_path / "look.pt")
+    look_of(read_model(model_path("ball"))).save(tmp_path / "look.pt")
     model = tmp_path / "own.onnx"
     run_module("vm_export.cli", folder / "model.pt", "--look", tmp_path / "look.pt", "-o", model)
     exported = read_model(model)
     assert exported.manifest.provenance["start_sha256"] == read_model(model_path("ball")).sha256
-    assert exported.looks
+    assert exported.look
 
 
 def test_the_mask_has_the_truth_if_the_scene_only_gives_the_radius(frames, tmp_path):

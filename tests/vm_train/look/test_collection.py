@@ -1,5 +1,7 @@
 """Patches are the same whoever collects them, and whatever interrupts it."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -26,11 +28,10 @@ def _small_chunks(monkeypatch):
 def begin(drawn, tiny, tmp_path):
     """Begins a run on the drawn pictures, or those of another folder."""
 
-    def begin_one(name="run", data=drawn, strict=False, changes=None):
+    def begin_one(name="run", data=drawn, strict=False, changes=None, mesh="ball"):
         split = split_by_seed([each.number for each in find_pictures(data)], 0.25, 0.0, 0)
         configuration = read_sections(LookConfiguration, tiny, changes)
-        model = model_path("ball")
-        return begin_look_run(tmp_path / name, data, split, configuration, model, "ball", strict=strict)
+        return begin_look_run(tmp_path / name, data, split, configuration, model_path(mesh), mesh, strict=strict)
 
     return begin_one
 
@@ -65,8 +66,35 @@ def test_patches_have_labels_and_validation_counts_the_objects(begin):
         assert patches.patches.shape == (len(patches), 16, 16, 3)
         assert set(patches.labels.tolist()) <= {OBJECT, NOTHING}
         assert not patches.targets[patches.labels == NOTHING].any()
-    objects = sum(each.objects for each in chunks)
-    assert 3 <= sum(each.proposed for each in chunks) <= objects <= len(run.split.validation)
+        assert not patches.kinds.any()
+    ((objects, proposed),) = sum(each.truths for each in chunks).tolist()
+    assert 3 <= proposed <= objects <= len(run.split.validation)
+
+
+def test_each_class_has_patches_and_truths_of_its_own(begin, field):
+    """On the field, two posts and a robot are visible, and a ball."""
+    run = begin(data=field, mesh="soccer", changes={"patches": {"max_proposals": 24}})
+    assert run.classes == ("ball", "goal", "robot")
+    found = PatchChunk.joined(collect_patches(run, 1))
+    assert not found.faults
+    visible, proposed = found.truths.T
+    assert visible.tolist() == [len(run.split.validation) * each for each in (1, 2, 1)]
+    assert (proposed <= visible).all()
+    assert (proposed > 0).all()
+    validates = np.isin(np.array(run.numbers)[found.patches.pictures], run.split.validation)
+    for kind in range(3):
+        of = [found.patches.part((found.patches.kinds == kind) & (validates == part)) for part in (False, True)]
+        assert all(0 < each.objects < len(each) for each in of)
+        assert len(of[1]) <= 24 * len(run.split.validation)
+
+
+def test_a_picture_that_cannot_be_used_has_no_truths_of_any_class(begin, field, tmp_path):
+    folder = shutil.copytree(field, tmp_path / "field")
+    for path in folder.glob("lens*"):
+        path.unlink()
+    found = PatchChunk.joined(collect_patches(begin(data=folder, mesh="soccer"), 1))
+    assert (len(found.patches), found.truths.tolist()) == (0, [[0, 0]] * 3)
+    assert len(found.faults) == 8
 
 
 def test_pictures_for_training_have_patches_at_all_kinds_of_places_and_those_for_validation_at_proposals(begin):

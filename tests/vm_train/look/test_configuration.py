@@ -12,7 +12,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_train.evaluation.answers import load_subject
 from vm_train.look.configuration import LookConfiguration, LookRecipe
-from vm_train.look.fitting import class_to_judge
+from vm_train.look.fitting import classes_to_judge
 from vm_train.runs.configuration import header
 
 
@@ -29,8 +29,8 @@ def test_the_printed_file_is_the_default_configuration(tmp_path):
 
 
 def test_the_shape_of_the_network_comes_from_two_sections():
-    shape = read("patches.size=24", "network.channels=[4, 6, 8]", "network.hidden=5").shape
-    assert (shape.size, shape.channels, shape.hidden) == (24, (4, 6, 8), 5)
+    shape = read("patches.size=24", "network.channels=[4, 6, 8]", "network.hidden=5").shape(3)
+    assert (shape.size, shape.channels, shape.hidden, shape.classes) == (24, (4, 6, 8), 5, 3)
 
 
 @pytest.mark.parametrize(
@@ -51,15 +51,38 @@ def test_a_wrong_entry_is_named_with_what_is_allowed(entry, said):
     assert said in str(error.value)
 
 
-def test_uprights_need_the_classes_that_tell_where_they_stand():
-    subject = load_subject(model_path("soccer"), Settings())
-    masks = (
-        "classes.robot={ kind = 'upright', colors = [[255, 255, 0]] }",
-        "classes.other={ kind = 'background', colors = [[0, 0, 0]] }",
-    )
-    configuration = read("patches.object_class=robot", *masks)
-    with pytest.raises(InputError, match=r"the truth about a robot needs the classes goal, line"):
-        class_to_judge(configuration, subject, "soccer")
+@pytest.fixture(scope="module")
+def soccer():
+    return load_subject(model_path("soccer"), Settings())
+
+
+def test_a_look_judges_all_that_its_mesh_network_has_peaks_for(soccer):
+    assert classes_to_judge(read(), soccer, "soccer") == ("ball", "goal", "robot")
+    assert classes_to_judge(read(), load_subject(model_path("ball"), Settings()), "ball") == ("ball",)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "said"),
+    [
+        ({"line": None, "field": None}, "the truth about a goal needs the classes line, field"),
+        ({"robot": None}, "the truth about a goal needs the classes robot"),
+        (
+            {"robot": "area"},
+            r"has class 'robot', but those of the kind upright in \[classes\] are goal: give the class",
+        ),
+        ({"ball": None}, r"has class 'ball', but those of the kind object in \[classes\] are none: give the class"),
+    ],
+)
+def test_masks_need_all_classes_and_uprights_those_that_tell_where_they_stand(soccer, kinds, said):
+    given = {"ball": "object", "goal": "upright", "line": "area", "field": "area", "robot": "upright"} | kinds
+    masks = [
+        f"classes.{name}={{ kind = '{kind}', colors = [[{number}, 0, 0]] }}"
+        for number, (name, kind) in enumerate(given.items())
+        if kind is not None
+    ]
+    configuration = read(*masks, "classes.other={ kind = 'background', colors = [[0, 0, 9]] }")
+    with pytest.raises(InputError, match=said):
+        classes_to_judge(configuration, soccer, "soccer")
 
 
 @pytest.mark.parametrize(("epochs", "rounds"), [(12, 3), (7, 3), (5, 5), (4, 1), (1, 3)])

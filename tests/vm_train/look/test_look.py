@@ -12,6 +12,7 @@ from tests.drawn_scenes import CHECKPOINT
 from tests.vm_train.commands import run, run_and_stop, run_module
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.network.bundled import model_path
+from vm_embedded.network.look_contract import JudgedClass
 from vm_embedded.network.model_file import read_model
 from vm_export.eight_bits import rounded
 from vm_export.look_checkpoint import LookCheckpoint
@@ -44,16 +45,16 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     folder, done = whole
     lines = done.stdout.splitlines()
     assert re.fullmatch(r".*: 20 pictures: \d+ for training, \d+ for validation, 0 for test", lines[0])
-    assert re.fullmatch(r"training: \d+ patches, \d+ of them show the object ball", lines[1])
-    assert re.fullmatch(r"validation: \d+ proposals, \d+ of them show the object ball", lines[2])
-    assert re.fullmatch(r"the mesh network proposes \d+ of \d+ visible objects \(\d+ %\)", lines[3])
-    assert lines[4].startswith("validation AP: ")
-    for number, line in enumerate(lines[5:9], start=1):
-        learned = r"validation AP [\d.]+, .*; loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left"
+    learned_from = r"ball: \d+ patches for training, \d+ of them with the object; for validation"
+    assert re.fullmatch(learned_from, lines[1])
+    assert re.fullmatch(r"  \d+ proposals, \d+ of them right: \d+ of \d+ visible objects \(\d+ %\)", lines[2])
+    assert lines[3].startswith("validation AP: ")
+    for number, line in enumerate(lines[4:8], start=1):
+        learned = r"validation AP of ball [\d.]+, .*; loss [\d.]+, learning rate [\d.e-]+, 0:00:\d\d left"
         assert re.fullmatch(rf"epoch {number} of 4: {learned}", line), line
-    assert "look.pt: in " in lines[9]
+    assert "look.pt, ball: in " in lines[8]
     output = folder / "model.onnx"
-    assert lines[10] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
+    assert lines[9] == f"next: vm-export {folder / 'mesh.onnx'} --look {folder / 'look.pt'} -o {output}"
     assert {path.name for path in folder.iterdir()} == {
         *("look.toml", "pictures.json", "run.json", "mesh.onnx", "patches", "state.pt", "log.jsonl", "tensorboard"),
         *("look.pt", "result.json"),
@@ -63,7 +64,8 @@ def test_a_training_leaves_a_network_a_log_and_what_it_was_made_of(whole, drawn)
     assert steps == list(range(1, len(steps) + 1))
     assert [(each["round"], each["epoch"]) for each in records if "epoch" in each] == [(1, 1), (1, 2), (1, 3), (1, 4)]
     result = json.loads((folder / "result.json").read_text())
-    assert sum(each["count"] for each in result["bins"]) > 0
+    assert list(result) == ["ball"]
+    assert sum(each["count"] for each in result["ball"]["bins"]) > 0
 
 
 def test_what_the_training_of_the_mesh_network_held_out_stays_held_out(whole, look, drawn, tmp_path):
@@ -82,16 +84,18 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     folder, _ = whole
     made = LookCheckpoint.load(folder / "look.pt")
     contract = made.contract
-    assert (contract.object_class, contract.size, contract.channels) == ("ball", 16, (4, 6, 8))
+    assert contract.classes == (JudgedClass(name="ball"),)
+    assert (contract.size, contract.channels) == (16, (4, 6, 8))
     assert (contract.extent, contract.max_proposals) == (1.75, 10)
     assert made.examples.shape == (4, 16, 16, 3)
     assert contract.provenance["data"] == drawn.name
+    assert re.fullmatch(rf"\d+ validation pictures of {drawn.name}", contract.classes[0].calibrated_on)
     assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["made_from"]["mesh.onnx"]
     for layer in (*made.network.typed_convolutions, made.network.hidden):
         kernel = layer.weight.detach().numpy()
         assert np.array_equal(kernel, rounded(kernel))
-    scale, offset = made.network.calibration.tolist()
-    calibration = json.loads((folder / "result.json").read_text())["calibration"]
+    ((scale, offset),) = made.network.calibration.tolist()
+    calibration = json.loads((folder / "result.json").read_text())["ball"]["calibration"]
     assert (scale, offset) == pytest.approx((calibration["scale"], calibration["offset"]))
 
 
@@ -100,7 +104,7 @@ def test_the_next_command_attaches_it_to_its_mesh_network(whole):
     folder, done = whole
     _, *arguments = done.stdout.splitlines()[-1].removeprefix("next: ").split()
     run_module("vm_export.cli", *arguments)
-    (found,) = read_model(folder / "model.onnx").manifest.looks
+    found = read_model(folder / "model.onnx").manifest.look
     assert LookCheckpoint.load(folder / "look.pt").contract.provenance.items() <= found.provenance.items()
     assert found.self_test is not None
     (folder / "model.onnx").unlink()
@@ -185,7 +189,7 @@ def complaint(drawn, tiny, tmp_path, capsys):
         (["--from", "none.txt"], "a model must be a checkpoint (.pt) or a model file (.onnx)"),
         (["--from", str(CHECKPOINT)], "a close look judges peaks, and this network has none"),
         (["--set", "patches.size=1000"], "[patches] size must be a whole number from 8 to 128 px, not 1000"),
-        (["--set", "patches.object_class=goal"], "unknown class with peaks of ball 'goal'; did you mean 'ball'?"),
+        (["--set", "patches.object_class=goal"], "unknown entry in [patches] 'object_class'"),
         (["--set", "data.validation=0"], "validation gets none of the 20 pictures"),
         (["--set", "classes=1"], "--set 'classes=1' must have the form SECTION.ENTRY=VALUE"),
         (["--config", "none.toml"], "can't read configuration none.toml"),
@@ -254,11 +258,11 @@ def test_a_short_training_tells_balls_from_everything_else(tmp_path):
     settings = ["data.validation=0.3", "patches.size=16", "network.channels=[8, 12, 16]", "training.batch=64"]
     options = [part for each in settings for part in ("--set", each)]
     run("look", data, "--from", model_path("ball"), "-o", tmp_path / "run", *options, "--workers", 2)
-    result = json.loads((tmp_path / "run" / "result.json").read_text())
+    result = json.loads((tmp_path / "run" / "result.json").read_text())["ball"]
     assert result["average_precision"] > 0.9
     assert result["calibration_error"] < 0.1
     records = [record for _, record in read_log(tmp_path / "run" / "log.jsonl")]
     last = [each for each in records if "epoch" in each][-1]
-    assert last["average_precision"] > 0.9
-    assert last["center_error"] < 0.15
+    assert last["ball average_precision"] > 0.9
+    assert last["ball center_error"] < 0.15
     assert np.isfinite(result["calibration"]["scale"])

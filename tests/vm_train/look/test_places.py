@@ -10,7 +10,7 @@ from tests.vm_embedded.detection.views import BALL, center_at, observation_of, v
 from vm_embedded.detection.patches import Tangents
 from vm_train.look.configuration import PatchSettings
 from vm_train.look.labels import Truths, label_places
-from vm_train.look.places import PatchPlaces, jittered_places, proposed_places, random_places
+from vm_train.look.places import PatchPlaces, jittered_places, random_places
 
 VIEW = view_at()
 NEAR, FAR = center_at(VIEW, (320.0, 330.0)), center_at(VIEW, (200.0, 230.0))
@@ -45,7 +45,7 @@ def test_hidden_objects_and_pictures_without_any_have_no_jittered_places():
 @given(st.integers(0, 2**32))
 def test_random_places_are_in_the_picture_and_on_the_mesh(seed):
     observation = observation_of(VIEW)
-    found = random_places(observation, PatchSettings(random=5), random(seed))
+    found = random_places(observation, VIEW, PatchSettings(random=5), random(seed))
     assert len(found) <= 5
     assert (np.hypot(*found.centers.T[:2]) < observation.manifest.max_distance).all()
     pixels = VIEW.ray_pixels(found.centers / np.linalg.norm(found.centers, axis=1, keepdims=True))
@@ -54,7 +54,8 @@ def test_random_places_are_in_the_picture_and_on_the_mesh(seed):
 
 def test_proposals_are_at_the_balls():
     observation = test_looking.observed(NEAR, FAR)
-    found = proposed_places(observation.view, observation.peaks["ball"], PatchSettings())
+    view = observation.view
+    found = PatchPlaces.of(view.shape.center_along(observation.peaks["ball"].rays, view.height))
     labels = label_places(found.tangents(test_looking.VIEW), truths(NEAR, FAR))
     assert set(labels.of) >= {0, 1}
 
@@ -62,7 +63,7 @@ def test_proposals_are_at_the_balls():
 @pytest.mark.parametrize("factor", [0.8, 1.0, 1.25])
 def test_a_patch_that_is_cut_larger_shows_a_smaller_ball_and_its_target_says_so(factor):
     places = PatchPlaces(NEAR[None], np.array([factor]))
-    patch = places.cut(observation_of(VIEW, NEAR), PatchSettings(size=64, extent=2.0))[0, :, :, 0]
+    patch = places.cut(observation_of(VIEW, NEAR).pyramid, VIEW, PatchSettings(size=64, extent=2.0))[0, :, :, 0]
     radius = np.sqrt((patch > 127).sum() / np.pi) / 64 * 4.0  # in expected radii
     assert radius == pytest.approx(1.0 / factor, rel=0.02)
     found = label_places(places.tangents(VIEW), truths(NEAR))
@@ -74,7 +75,8 @@ def test_a_patch_that_is_cut_larger_shows_a_smaller_ball_and_its_target_says_so(
 def test_the_ball_in_a_patch_is_where_its_targets_say(right, down, factor):
     ray = Tangents.at(VIEW, NEAR[None]).rays(np.array([right]), np.array([down]))
     places = PatchPlaces(BALL.center_along(ray, VIEW.height), np.array([factor]))
-    patch = places.cut(observation_of(VIEW, NEAR), PatchSettings(size=48, extent=2.0))[0, :, :, 0].astype(float)
+    patch = places.cut(observation_of(VIEW, NEAR).pyramid, VIEW, PatchSettings(size=48, extent=2.0))[0, :, :, 0]
+    patch = patch.astype(float)
     target = label_places(places.tangents(VIEW), truths(NEAR)).targets[0]
     at = (np.arange(48) + 0.5) / 48 * 4.0 - 2.0
     assert (patch.sum(axis=0) @ at) / patch.sum() == pytest.approx(target[0], abs=0.03)
@@ -83,4 +85,4 @@ def test_the_ball_in_a_patch_is_where_its_targets_say(right, down, factor):
 
 def test_places_of_no_proposals_can_be_cut():
     places = PatchPlaces.of(np.empty((0, 3)))
-    assert places.cut(observation_of(VIEW), PatchSettings(size=16)).shape == (0, 16, 16, 3)
+    assert places.cut(observation_of(VIEW).pyramid, VIEW, PatchSettings(size=16)).shape == (0, 16, 16, 3)

@@ -1,15 +1,19 @@
 """Scores of a look network, and the calibration of its probability."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.looks import random_patches
+from vm_export.look_network import LookNetwork, LookShape
 from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchSet
-from vm_train.look.scores import LookScore, result_in_words, result_values
+from vm_train.look.scores import LookScore, logits_of, result_in_words, result_values
 from vm_train.look.validation import shown_before
 from vm_train.scores.calibration import BINS, Calibration, Reliability
 from vm_train.scores.object_ranking import Ranking
@@ -63,6 +67,18 @@ def test_errors_are_medians_over_patches_with_an_object():
     logits[:, 3] = [0.1, -0.1, 0.1, 9.0]
     found = LookScore.of(logits, patches)
     assert (found.average_precision, found.center_error, found.size_error) == pytest.approx((1.0, 0.2, 0.1))
+
+
+def test_the_answers_to_a_patch_are_those_about_its_class():
+    patches = random_patches(2100, 16)
+    network = LookNetwork(LookShape(16, (2, 3, 4), 5, classes=3)).eval()
+    kinds = np.arange(2100, dtype=np.int8) % 3
+    none = PatchSet.empty(16, 2100)
+    found = logits_of(network, replace(none, patches=patches, kinds=kinds))
+    with torch.no_grad():
+        expected = network.logits(torch.from_numpy(patches)).numpy()
+    np.testing.assert_allclose(found, expected[np.arange(2100), kinds], atol=1e-5)
+    assert logits_of(network, PatchSet.empty(16)).shape == (0, 4)
 
 
 def test_the_result_counts_what_is_reported_and_what_is_missed():

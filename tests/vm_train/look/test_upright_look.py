@@ -1,19 +1,24 @@
-"""The training of a close look at goal posts and robots: truths from the scene, and the command as a user types it."""
+"""The training of a close look at balls, goal posts and robots: truths from the scene, and the command as a user types
+it."""
 
+import json
 import re
+import shutil
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
+from tests.looks import upright
 from tests.vm_train.commands import run, run_module
-from tests.vm_train.fields import CLASSES, STANDING, picture, write_pictures
+from tests.vm_train.fields import CLASSES, STANDING, picture
 from vm_embedded import Detector, read_lens_file
 from vm_embedded.detection.looking import around_bases
 from vm_embedded.detection.settings import Settings
 from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
+from vm_embedded.network.look_contract import JudgedClass
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_train.evaluation.answers import load_subject
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED, label_places, true_bases
@@ -24,7 +29,6 @@ RADIUS = 0.3
 SCENE = FieldScene(
     tuple(Standing(each["kind"], each["base"], each["width"], each["height"]) for each in STANDING), False, None
 )
-GRAYS = {"ball": 200, "goal": 240, "line": 250, "field": 90, "robot": 30, "environment": 140}
 
 
 @pytest.fixture(scope="module")
@@ -87,38 +91,61 @@ def test_a_scene_that_does_not_tell_what_stands_there_is_refused(view, scene):
 
 
 @pytest.fixture(scope="module")
-def field(tmp_path_factory):
-    """A folder of the drawn field in grays, with other brightness in each picture."""
-    folder = write_pictures(tmp_path_factory.mktemp("field"), 8)
-    grays = np.array([GRAYS[name] for name in CLASSES], dtype=np.uint8)[picture().labels]
-    for number in range(8):
-        noise = np.random.default_rng(number).integers(0, 12, grays.shape, dtype=np.uint8)
-        gray = cv2.add(cv2.convertScaleAbs(grays, alpha=1.0 - 0.05 * number), noise)
-        cv2.imwrite(str(folder / f"image{number}.jpg"), cv2.merge([gray] * 3))
-    return folder
+def together(field, tiny, tmp_path_factory):
+    """The folder of a training for balls and uprights, and what it printed."""
+    folder = tmp_path_factory.mktemp("together") / "run"
+    given = ["--from", "soccer", "--config", tiny, "--workers", 1]
+    given += ["--set", "patches.max_proposals=24", "--set", "patches.upright_radius=0.5"]
+    return folder, run("look", field, "-o", folder, *given).stdout.splitlines()
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["goal", "robot"])
-def test_a_trained_look_goes_into_a_model_file_and_runs_there(field, tiny, tmp_path, name):
-    given = ["--from", "soccer", "--config", tiny, "--set", f"patches.object_class={name}", "--workers", 1]
-    given += ["--set", "patches.max_proposals=24", "--set", "patches.upright_radius=0.5"]
-    lines = run("look", field, "-o", tmp_path / "run", *given).stdout.splitlines()
-    assert re.fullmatch(rf"training: \d+ patches, \d+ of them show the object {name}", lines[1])
-    contract = LookCheckpoint.load(tmp_path / "run" / "look.pt").contract
-    assert (contract.object_class, contract.upright_radius) == (name, 0.5)
+def test_a_training_tells_each_class(together):
+    folder, lines = together
+    found = r"  \d+ proposals, \d+ of them right: \d+ of \d+ visible objects \(\d+ %\)"
+    for name, first, second in zip(("ball", "goal", "robot"), lines[1:7:2], lines[2:7:2], strict=True):
+        assert re.fullmatch(rf"{name}: \d+ patches for training, \d+ of them with the object; for validation", first)
+        assert re.fullmatch(found, second)
+    score = r"[\d.]+ / [\d.]+ / [\d.]+"
+    errors = f"center error {score} radii, size error {score} %"
+    assert re.match(rf"epoch 4 of 4: validation AP of ball / goal / robot {score}, {errors}; ", lines[11])
+    for name, line in zip(("ball", "goal", "robot"), lines[12:15], strict=True):
+        assert line.startswith(f"{folder / 'look.pt'}, {name}: in ")
+
+
+@pytest.mark.long
+def test_its_network_has_a_calibration_and_examples_of_each_class(together):
+    folder, _ = together
+    made = LookCheckpoint.load(folder / "look.pt")
+    contract = made.contract
+    assert contract.classes == (JudgedClass(name="ball"), upright("goal", 0.5), upright("robot", 0.5))
+    assert made.examples.shape[0] > 4
+    results = json.loads((folder / "result.json").read_text())
+    fitted = [(results[name]["calibration"]["scale"], results[name]["calibration"]["offset"]) for name in results]
+    assert list(results) == list(contract.names)
+    assert made.network.calibration.numpy() == pytest.approx(np.array(fitted), rel=1e-5)
+    assert all(each.calibrated_on for each in contract.classes)
+    assert re.fullmatch(r"ball [\d.]+, goal [\d.]+, robot [\d.]+", contract.provenance["validation_average_precision"])
+
+
+@pytest.mark.long
+def test_a_trained_look_goes_into_a_model_file_and_runs_there(field, together):
+    folder, lines = together
     run_module("vm_export.cli", *lines[-1].removeprefix("next: vm-export ").split())
-    detector = Detector.from_file(tmp_path / "run" / "model.onnx")
-    radii = {key: look.contract.upright_radius for key, look in detector.looks.items()}
-    assert radii == {"ball": 0.0, "goal": 0.4, "robot": 0.4} | {name: 0.5}  # the others are those of soccer
+    detector = Detector.from_file(folder / "model.onnx")
+    radii = {each.name: each.upright_radius for each in detector.look.contract.classes}
+    assert radii == {"ball": 0.0, "goal": 0.5, "robot": 0.5}
     lens = read_lens_file(field / "lens0.yaml")
     found = detector.detect(cv2.imread(str(field / "image0.jpg")), lens.orientation, lens.lens)
     assert found.field is not None
-    assert all(np.isfinite(each.position).all() for each in (*found.field.posts, *found.field.robots))
+    assert all(np.isfinite(each.position).all() for each in (*found.objects, *found.field.posts, *found.field.robots))
 
 
-def test_classes_that_nobody_can_look_at_are_refused(field, tiny, tmp_path):
-    given = ["--from", "soccer", "--config", tiny, "--set", "patches.object_class=line"]
-    done = run("look", field, "-o", tmp_path / "run", *given, code=1)
-    assert "'line'" in done.stderr
-    assert all(name in done.stderr for name in ("ball", "goal", "robot"))
+@pytest.mark.parametrize(("name", "changes"), [("ball", {"ball": None}), ("robot", {"standing": STANDING[:3]})])
+def test_a_class_that_no_picture_shows_is_named(name, changes, field, tiny, tmp_path):
+    folder = shutil.copytree(field, tmp_path / "field")
+    for path in folder.glob("scene*.json"):
+        path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+    given = ["--from", "soccer", "--config", tiny, "--workers", 1]
+    done = run("look", folder, "-o", tmp_path / "run", *given, code=1)
+    assert re.search(rf"none of the \d+ patches for training show the object {name}: ", done.stderr)

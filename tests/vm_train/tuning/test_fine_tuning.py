@@ -12,7 +12,7 @@ from tests.vm_train.commands import run, run_and_stop
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_embedded.network.session import CloseLook
-from vm_export.look_weights import looks_of
+from vm_export.look_weights import look_of
 from vm_train.boxes.read import read_boxes
 from vm_train.cli.train import main
 from vm_train.runs.log import read_log
@@ -82,12 +82,26 @@ def test_the_new_model_differs_only_in_its_close_look(whole):
     before, after = read_model(model_path("ball")), read_model(folder / "model.onnx")
     assert after.manifest.classes == before.manifest.classes
     assert after.manifest.self_test.as_dict() == before.manifest.self_test.as_dict()
-    assert after.looks != before.looks
-    provenance = after.manifest.looks[0].provenance
+    assert after.look != before.look
+    assert after.manifest.look.classes == before.manifest.look.classes
+    provenance = after.manifest.look.provenance
     assert provenance["fine_tuned_frames"] == "4"
     assert provenance["fine_tuned_from_sha256"] == before.sha256
-    assert provenance["data"] == before.manifest.looks[0].provenance["data"]
+    assert provenance["data"] == before.manifest.look.provenance["data"]
     CloseLook.of(after)  # loads, and passes its self-tests
+
+
+@pytest.mark.long
+def test_a_look_of_several_classes_still_judges_all_of_them(tune, tmp_path):
+    tune(tmp_path / "run", "--from", "soccer")
+    before, after = read_model(model_path("soccer")), read_model(tmp_path / "run" / "model.onnx")
+    assert after.manifest.look.names == ("ball", "goal", "robot")
+    assert after.manifest.look.classes == before.manifest.look.classes
+    size = after.manifest.look.size
+    patches = np.random.default_rng(0).integers(0, 256, (20, size, size, 3), np.uint8)
+    old, new = (CloseLook.of(each).run(patches) for each in (before, after))
+    assert np.isfinite(new).all()
+    assert (np.abs(new - old).max(axis=(0, 2)) > 1e-4).all()  # they share layers, so all change
 
 
 @pytest.mark.long
@@ -220,9 +234,9 @@ def test_tune_config_prints_what_config_reads(tmp_path, tune):
 
 def test_weights_of_a_file_written_again_are_the_same(whole):
     """Reading a look network back from a model file and writing it again loses nothing."""
-    (again,) = looks_of(read_model(whole[0] / "model.onnx"))
+    again = look_of(read_model(whole[0] / "model.onnx"))
     patches = np.random.default_rng(0).integers(0, 256, (5, again.contract.size, again.contract.size, 3), np.uint8)
-    look = CloseLook.of(read_model(whole[0] / "model.onnx"))["ball"]
+    look = CloseLook.of(read_model(whole[0] / "model.onnx"))
     import torch
 
     with torch.inference_mode():

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from tests.looks import look_contract
 from vm_embedded.detection.pyramid import Pyramid
 from vm_train.look.labels import NOTHING, OBJECT, UNLABELED
-from vm_train.tuning.candidates import find_candidates, search_radii, seen_objects
+from vm_train.tuning.candidates import ClassLook, find_candidates, search_radii, seen_objects
 from vm_train.tuning.windows import Windows, grid_windows, jittered_windows, random_windows
 
 CONTRACT = look_contract(size=16, extent=2.0)
@@ -20,24 +20,28 @@ def windows(*rows):
 
 
 class Bright:
-    """Judges a patch by its bright pixels, as a look network would: probability, shift and size."""
+    """Judges a patch by its bright pixels, as a look network would: probability, shift and size of a ball, and nothing
+    of a cup."""
 
-    contract = look_contract(size=32, extent=2.0)
+    contract = look_contract("cup", "ball", size=32, extent=2.0)
 
     def run(self, patches):
         bright = patches[..., 0] > 128
-        answers = np.zeros((len(patches), 4), dtype=np.float32)
+        answers = np.zeros((len(patches), 2, 4), dtype=np.float32)
         steps = (np.arange(32) + 0.5) / 32 * 4.0 - 2.0
         for number, each in enumerate(bright):
             count = each.sum()
             if 60 < count < 500:
-                answers[number] = [
+                answers[number, 1] = [
                     0.9 - 0.0002 * abs(int(count) - 201),
                     (each.sum(axis=0) * steps).sum() / count,
                     (each.sum(axis=1) * steps).sum() / count,
                     0.5 * np.log(count / 201.0),
                 ]
         return answers
+
+
+BRIGHT = ClassLook(Bright(), "ball")
 
 
 def disks(*rows, size=(200, 150)):
@@ -116,21 +120,28 @@ def test_sizes_to_look_for_cover_those_of_the_objects(rows):
 def test_the_network_finds_each_disk_once_wherever_it_is():
     true = windows((40.3, 60.0, 10.0), (150.0, 35.5, 14.0))
     pyramid = disks((40.3, 60.0, 10.0), (150.0, 35.5, 14.0))
-    seen, probabilities = seen_objects(pyramid, (200, 150), Bright(), np.array([7.0, 10.0, 14.0]), 0.1, 10)
+    seen, probabilities = seen_objects(pyramid, (200, 150), BRIGHT, np.array([7.0, 10.0, 14.0]), 0.1, 10)
     assert len(seen) == 2
     assert (probabilities > 0.8).all()
     assert (np.diff(probabilities) <= 0.0).all()
     order = np.argsort(seen.centers[:, 0])
     np.testing.assert_allclose(seen.centers[order], true.centers, atol=0.5)
-    assert len(find_candidates(pyramid, (200, 150), Bright(), np.array([10.0, 14.0]), 0.1, 1)) == 1
-    assert len(find_candidates(disks(), (200, 150), Bright(), np.array([10.0]), 0.1, 10)) == 0
+    assert len(find_candidates(pyramid, (200, 150), BRIGHT, np.array([10.0, 14.0]), 0.1, 1)) == 1
+    assert len(find_candidates(disks(), (200, 150), BRIGHT, np.array([10.0]), 0.1, 10)) == 0
+
+
+def test_only_the_class_that_is_sought_counts():
+    pyramid, cups = disks((40.3, 60.0, 10.0)), ClassLook(Bright(), "cup")
+    assert (cups.name, cups.contract) == ("cup", BRIGHT.contract)
+    assert len(find_candidates(pyramid, (200, 150), cups, np.array([10.0]), 0.1, 10)) == 0
+    assert BRIGHT.run(np.zeros((3, 32, 32, 3), dtype=np.uint8)).shape == (3, 4)
 
 
 @pytest.mark.parametrize("radius", [9.0, 10.5, 12.0])
 def test_an_object_has_the_size_that_the_network_sees(radius):
     """Not that of the window: the sizes that it looks for are far apart."""
     pyramid = disks((80.0, 60.0, radius))
-    seen, _ = seen_objects(pyramid, (200, 150), Bright(), np.array([10.0]), 0.1, 10)
+    seen, _ = seen_objects(pyramid, (200, 150), BRIGHT, np.array([10.0]), 0.1, 10)
     assert seen.radii == pytest.approx([radius], rel=0.06)
 
 
