@@ -211,8 +211,10 @@ def test_the_debug_image_is_made_for_who_subscribes(tmp_path, peer):
     peer.listen(DRAWN, "CompressedImage")
     peer.middleware.start()
     with Robot(peer) as robot, running(tmp_path) as node:
-        node.wait(lambda: len(peer.received(DRAWN)) > 2)
+        node.wait(lambda: len(peer.received(DRAWN)) > 5)
         node.stop()
+    stamps = [seconds_of(each.header.stamp) for each in peer.received(DRAWN)]
+    assert min(np.diff(stamps)) > 0.099  # drawings take time, and ten a second are enough
     message = peer.received(DRAWN)[-1]
     drawn = cv2.imdecode(message.data, cv2.IMREAD_COLOR)
     time = min(robot.shown, key=lambda each: abs(each - seconds_of(message.header.stamp)))
