@@ -12,7 +12,6 @@ from tests.drawn_scenes import CHECKPOINT
 from tests.vm_train.commands import run, run_and_stop, run_module
 from tests.vm_train.drawn import CLASSES, draw_set
 from vm_embedded.network.bundled import model_path
-from vm_embedded.network.look_contract import JudgedClass
 from vm_embedded.network.model_file import read_model
 from vm_export.eight_bits import rounded
 from vm_export.look_checkpoint import LookCheckpoint
@@ -84,12 +83,13 @@ def test_its_network_knows_its_contract_and_where_it_comes_from(whole, drawn):
     folder, _ = whole
     made = LookCheckpoint.load(folder / "look.pt")
     contract = made.contract
-    assert contract.classes == (JudgedClass(name="ball"),)
+    (ball,) = contract.classes
+    assert (ball.name, ball.upright_radius, ball.mesh_weight) == ("ball", 0.0, 0.0)
     assert (contract.size, contract.channels) == (16, (4, 6, 8))
     assert (contract.extent, contract.max_proposals) == (1.75, 10)
     assert made.examples.shape == (4, 16, 16, 3)
     assert contract.provenance["data"] == drawn.name
-    assert re.fullmatch(rf"\d+ validation pictures of {drawn.name}", contract.classes[0].calibrated_on)
+    assert re.fullmatch(rf"\d+ validation pictures of {drawn.name}", ball.calibrated_on)
     assert contract.provenance["mesh_sha256"] == json.loads((folder / "run.json").read_text())["made_from"]["mesh.onnx"]
     for layer in (*made.network.typed_convolutions, made.network.hidden):
         kernel = layer.weight.detach().numpy()
