@@ -23,7 +23,7 @@ from vm_embedded.output.result_files import make_folder
 
 from .configuration import KINDS, configuration_name
 
-_FORMAT = 6
+_FORMAT = 7
 
 
 @dataclass(frozen=True)

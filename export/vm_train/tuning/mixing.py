@@ -81,7 +81,7 @@ class Mixer:
         for share in _SHARES:
             network = mixed(self._before, after, share)
             now = Remembered.of(network, self._old)
-            if not (np.array(now.losses) > limit).any():
+            if (np.isnan(limit) | (np.array(now.losses) <= limit)).all():
                 break
         for row, new, old in zip(network.calibration, now.calibrations, before.calibrations, strict=True):
             row.copy_(torch.tensor([new.scale / old.scale, (new.offset - old.offset) / old.scale]))
