@@ -237,7 +237,7 @@ def test_the_status_says_what_is_missing(tmp_path, peer):
 
 
 class Gate:
-    """A connection whose publishers wait until it opens. read: topics with readers. sent: what came through, by topic."""
+    """A connection whose publishers wait until it opens. read: topics with readers. sent: what came, by topic."""
 
     types, parameters, remark = plain_classes(map(short_name, FIELDS)), {}, ""
 
