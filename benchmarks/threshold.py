@@ -17,9 +17,8 @@ from pathlib import Path
 
 from benchmarks.shipped import FRAMES_AN_HOUR, NETWORKS
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Observation
+from vm_embedded.detection.observation import Observation, Stopwatch
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import GeometryError
 from vm_train.data.class_table import ClassTable
 from vm_train.data.pictures import read_picture

@@ -18,6 +18,7 @@ import api_page
 from vm_embedded.borders.records import Entry, Record, entries
 from vm_embedded.detection.detection import Detection
 from vm_embedded.detection.detections import STAGES
+from vm_embedded.detection.pose_state import PoseState
 from vm_embedded.detection.track import Track
 from vm_embedded.field.features import FieldFeatures
 from vm_embedded.output.binary_form import HEADER, LAYOUT, RECORDS, is_list, number_type
@@ -37,6 +38,7 @@ def pages(top: Path) -> dict[Path, str]:
         "field": table(FieldFeatures),
         "features": features_table(),
         "track": table(Track),
+        "pose": table(PoseState),
         "frame": table(LiveFrame),
         "state": table(StateMessage),
         "status": table(Status, without=StateMessage),

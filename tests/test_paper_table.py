@@ -145,7 +145,7 @@ def test_claims_name_only_what_their_code_has(claim, code):
 
 def test_the_text_of_a_definition_ends_with_it():
     label = "eqn:sphere_phi_1"
-    sphere = definitions("vm_embedded/geometry/sphere.py")
+    sphere = definitions("vm_embedded/geometry/shapes.py")
     assert label in sphere["Sphere.phi"][0]
     assert label not in sphere["Sphere.theta"][0]
     assert "0.75" in definitions("export/vm_train/scores/object_scores.py")["OVERLAPS"][0]

@@ -78,7 +78,7 @@ def steps_from(sources, shared, index, rays):
     """Graph steps (n,) of each point on screen from the nearest of `sources`."""
     from vm_embedded.detection.projection import project
     from vm_embedded.geometry.lens_files import read_lens_file
-    from vm_embedded.geometry.sphere import Sphere
+    from vm_embedded.geometry.shapes import Sphere
     from vm_embedded.mesh.models import build_mesh
 
     file = read_lens_file(shared / f"reference/images/lens{index:07d}.yaml")

@@ -11,14 +11,12 @@ from .detection.tracker import Tracker
 from .errors import GeometryError, InputError, ModelError, VisualMeshError
 from .field.features import Border, CenterCircle, Crossing, FieldFeatures, Segment, Upright
 from .geometry.calibrated_lenses import BrownLens, FisheyeLens
-from .geometry.circle import Circle
-from .geometry.cylinder import Cylinder
 from .geometry.lens import Lens
 from .geometry.lens_files import read_lens_file
 from .geometry.orientation import Orientation
 from .geometry.planes import GROUND, Plane, Pose
 from .geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
-from .geometry.sphere import Sphere
+from .geometry.shapes import Circle, Cylinder, Sphere
 from .mesh.models import build_mesh
 
 __all__ = [

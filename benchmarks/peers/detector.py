@@ -14,7 +14,7 @@ import numpy as np
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_workstation.outlines import shape_outline
 
 from .networks import KEPT, OVERLAP, one_thread

@@ -191,6 +191,30 @@ struct FieldFeatures {
     std::optional<Border> border{};
 };
 
+// What the frames so far say about the camera's pose.
+struct PoseState {
+    // wrong, doubtful or consistent; unknown if the frames show too little
+    char verdict{};
+    // error of the pitch: true minus assumed one; null if unknown [deg]
+    float pitch{};
+    // error of the roll: true minus assumed one; null if unknown [deg]
+    float roll{};
+    // how much larger the true height is; null if unknown [%]
+    float height{};
+    // number of different pictures
+    std::uint32_t frames{};
+    // number of balls that it rests on
+    std::uint32_t balls{};
+    // number of pieces of lines that it rests on
+    std::uint32_t lines{};
+    // correction that is added to the pitch; only with [pose] correct [deg]
+    float added_pitch{};
+    // correction that is added to the roll [deg]
+    float added_roll{};
+    // correction of the height [%]
+    float added_height{};
+};
+
 // A frame of a live camera.
 struct Frame {
     // number of the frame, from 1
@@ -209,6 +233,8 @@ struct Frame {
     std::vector<Detection> detections{};
     // features of the field; only with a network that knows them
     std::optional<FieldFeatures> field{};
+    // what the frames so far say about the camera's pose; null if it is not checked
+    std::optional<PoseState> pose{};
     // time of each stage and of the whole call [ms]
     Times timing_ms{};
 };
@@ -287,8 +313,8 @@ void read_list(Cursor& head, Cursor& body, std::optional<Item>& made) {
 }
 
 // messages: readers
-constexpr std::uint32_t layout_number = 3392188055U;
-constexpr std::size_t header_bytes = 128;
+constexpr std::uint32_t layout_number = 4388516U;
+constexpr std::size_t header_bytes = 132;
 
 inline void read(Cursor& from, Track& made) {
     read(from, made.id);
@@ -349,6 +375,19 @@ inline void read(Cursor& from, Border& made) {
     read(from, made.pixels.emplace_back());
 }
 
+inline void read(Cursor& from, PoseState& made) {
+    made.verdict = from.choice("unknownconsistentdoubtfulwrong");
+    read(from, made.pitch);
+    read(from, made.roll);
+    read(from, made.height);
+    read(from, made.frames);
+    read(from, made.balls);
+    read(from, made.lines);
+    read(from, made.added_pitch);
+    read(from, made.added_roll);
+    read(from, made.added_height);
+}
+
 inline void read(Cursor& head, Cursor& body, Frame& made) {
     read(head, made.frame);
     read(head, made.t);
@@ -367,6 +406,7 @@ inline void read(Cursor& head, Cursor& body, Frame& made) {
     read_list(head, body, field.crossings);
     read_list(head, body, field.border);
     if (!has_field) made.field.reset();
+    read_list(head, body, made.pose);
     read(head, made.timing_ms);
 }
 // end

@@ -50,11 +50,22 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     kalibr.add_argument("source", type=Path, metavar="FILE", help="file of Kalibr")
     kalibr.add_argument("--camera", metavar="NAME", help="camera of the file, as in cam0; needed if it has several")
 
-    pose = _parser("pose", "Estimate height, pitch and roll of a fixed camera from balls or a board on the floor.")
-    pose.add_argument(
-        "source", nargs="?", metavar="SOURCE", help="with --board: video, folder or picture of the board on the floor"
+    pose = _parser(
+        "pose",
+        "Estimate height, pitch and roll of a fixed camera from balls or a board on the floor, or from a film of a "
+        "field; or constant errors of a stream of poses from a recording of a field.",
+        "lens file to write, .yaml; with --field and a recording also the vm.toml to write, .toml",
     )
-    pose.add_argument("--lens", type=Path, required=True, metavar="FILE", help="lens file of the camera")
+    pose.add_argument(
+        "source",
+        nargs="?",
+        metavar="SOURCE",
+        help="with --board or --field: video, folder or picture of the board on the floor, or of the field",
+    )
+    pose.add_argument(
+        "--lens", type=Path, metavar="FILE", help="lens file of the camera; the frames of a recording have their own"
+    )
+    _add_field(pose)
     balls = pose.add_argument_group("balls on the floor")
     balls.add_argument(
         "--balls",
@@ -62,7 +73,12 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
         metavar="PATH",
         help="folder of pictures with boxes in YOLO format, or a JSON file of outlines or boxes",
     )
-    balls.add_argument("--radius", type=float, metavar="M", help="radius of the balls [m]; default: from the JSON file")
+    balls.add_argument(
+        "--radius",
+        type=float,
+        metavar="M",
+        help="radius of the balls [m]; default: from the JSON file, with --field that of the network",
+    )
     balls.add_argument(
         "--label",
         metavar="CLASS",
@@ -76,13 +92,39 @@ def parsers() -> dict[str, argparse.ArgumentParser]:
     pose.add_argument(
         "--thickness", type=float, default=0.0, metavar="M", help="thickness of the board [m]; default %(default)g"
     )
-    return {"board": board, "lens": lens, "kalibr": kalibr, "pose": pose}
+
+    photo = _parser("photo", "Estimate height, pitch and roll of a camera from one photo of a field.", needed=False)
+    photo.add_argument("source", metavar="PHOTO", help="image that shows lines of a field, and a ball if possible")
+    photo.add_argument("--lens", type=Path, metavar="FILE", help="lens file of the camera")
+    photo.add_argument("--fov", metavar="ANGLE", help="instead: the horizontal angle of view, such as 70deg")
+    photo.add_argument("--radius", type=float, metavar="M", help="radius of the ball [m]; default: the network's")
+    _add_line_width(photo)
+    return {"board": board, "lens": lens, "kalibr": kalibr, "pose": pose, "photo": photo}
 
 
-def _parser(command: str, description: str, output: str = "lens file to write, .yaml") -> argparse.ArgumentParser:
+def _parser(
+    command: str, description: str, output: str = "lens file to write, .yaml", needed: bool = True
+) -> argparse.ArgumentParser:
     made = Parser(prog=f"vm-calibrate {command}", description=description, epilog=_EPILOG)
-    made.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help=output)
+    made.add_argument("-o", "--output", type=Path, required=needed, metavar="FILE", help=output)
     return made
+
+
+def _add_field(parser: argparse.ArgumentParser) -> None:
+    field = parser.add_argument_group("a field")
+    field.add_argument(
+        "--field", action="store_true", help="SOURCE shows a field: use its lines, and balls on the floor"
+    )
+    _add_line_width(field)
+
+
+def _add_line_width(made: argparse._ActionsContainer) -> None:
+    made.add_argument(
+        "--line-width",
+        type=float,
+        metavar="M",
+        help="width of the lines [m], such as 0.05; without it, only balls tell the height",
+    )
 
 
 def _add_board(parser: argparse.ArgumentParser) -> None:

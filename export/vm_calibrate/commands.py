@@ -4,29 +4,38 @@ from __future__ import annotations
 
 import argparse
 import math
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from vm_embedded.cameras.image_files import open_source
+from vm_embedded.config.toml_writer import to_commented_toml
 from vm_embedded.config.units import parse_angle, parse_size
+from vm_embedded.detection.pose_search import View
 from vm_embedded.errors import InputError
 from vm_embedded.files import check_not_input, check_writable, write_file
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import format_lens_file, read_lens_file
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.live.configuration import HEADER, Configuration, read_configuration
+from vm_embedded.live.top_level_entries import checked_fov
+from vm_embedded.output.recorder import CONFIGURATION
 
 from .ball_fit import fit_balls
 from .balls import ball_files, read_balls
-from .board_drawing import board_svg
-from .board_on_floor import fit_board_on_floor
+from .board_on_floor import board_svg, fit_board_on_floor
 from .boards import Board, board_from
+from .field_pose import FieldFit, fit_field, read_views
 from .floor_pose import PoseFit
 from .frames import Sighting, choose, find_boards
 from .kalibr import read_kalibr
 from .lens_fit import LensFit, fit_lens
-from .report import lens_lines, lens_warnings, pose_lines
+from .report import field_lines, field_warnings, lens_lines, lens_warnings, pose_lines
+
+_NETWORK = "soccer"
+"""The network that sees lines and balls."""
 
 _MOST_PLACES = 30
 """Most frames from which a pose is fitted to a board on the floor."""
@@ -71,11 +80,43 @@ def kalibr(options: argparse.Namespace) -> None:
     _write(options.output, found, None, [f"lens            {name} of {options.source.name}, from Kalibr"])
 
 
+def photo(options: argparse.Namespace) -> None:
+    """Estimate a pose from one photo; print the options of vm-detect, and write a lens file if asked to."""
+    if (options.lens is None) == (options.fov is None):
+        raise InputError("give --lens FILE, or --fov ANGLE for a lens without distortion")
+    if options.output is not None:
+        _check_lens_path(options.output)
+        check_not_input(options.output, open_source(options.source).files)
+    _check_lengths(options)
+    lens = None if options.lens is None else read_lens_file(options.lens).lens
+    fov = None if options.fov is None else checked_fov(options.fov)
+    views, _ = read_views(options.source, lens, fov, None, most=1)
+    fit = fit_field(views, False, _NETWORK, options.radius, options.line_width)
+    lines = field_lines(fit, fixed=True)
+    if options.output is not None:
+        _write(options.output, views[0].lens, fit.orientation, lines)
+    else:
+        print("\n".join(lines))
+    given = f"--fov {options.fov}" if options.lens is None else f"--lens {shlex.quote(str(options.lens))}"
+    pose, radius = _pose_options(fit.orientation), _radius_option(options)
+    print(f"vm-detect {shlex.quote(options.source)} {given} {pose}{radius}")
+    _warn(field_warnings(fit))
+
+
 def pose(options: argparse.Namespace) -> None:
     """Estimate a pose and write it with the lens; the lens file may be completed in place."""
-    _check_lens_path(options.output)
-    if (options.balls is None) == (options.board is None):
-        raise InputError("give either --balls, or --board with a video or pictures of the board on the floor")
+    if not (options.field and options.output.suffix.lower() == ".toml"):
+        _check_lens_path(options.output)
+    if (options.balls is not None) + (options.board is not None) + options.field != 1:
+        raise InputError(
+            "give --balls, or --board with a video or pictures of the board on the floor, or --field with a film of a "
+            "field: one of them"
+        )
+    if options.field:
+        _refuse_unused(options, "--field", ("label", "size", "square", "charuco", "marker", "legacy", "thickness"))
+        return _pose_from_field(options)
+    if options.lens is None:
+        raise InputError("no lens; give --lens FILE")
     if options.board is not None:
         _refuse_unused(options, "--board", ("radius", "label", "size"))
     else:
@@ -142,6 +183,73 @@ def _pose_from_board(options: argparse.Namespace, lens: Lens) -> PoseFit:
     return fit_board_on_floor(sightings, lens.for_image(search.size), search.size, options.thickness)
 
 
+def _pose_from_field(options: argparse.Namespace) -> None:
+    """Write a fixed pose as a lens file, or the correction of a stream of poses as a vm.toml."""
+    if options.source is None:
+        raise InputError("--field needs SOURCE: a recording, video or folder of pictures of a field")
+    check_not_input(options.output, open_source(options.source).files)
+    _check_lengths(options)
+    file = None if options.lens is None else read_lens_file(options.lens)
+    views, has_poses = read_views(
+        options.source, None if file is None else file.lens, None, None if file is None else file.orientation
+    )
+    _tell(f"searching {len(views)} frames")
+    to_configuration = options.output.suffix.lower() == ".toml"
+    if to_configuration and not has_poses:
+        raise InputError(f"{options.source} has no poses to correct; give -o a name that ends in .yaml")
+    if not to_configuration and not _same_pose(views):
+        raise InputError("the poses of the frames differ: give -o a vm.toml, which gets the correction for all poses")
+    fit = fit_field(views, has_poses, _NETWORK, options.radius, options.line_width)
+    if to_configuration:
+        lines = field_lines(fit, fixed=False)
+        _write_correction(options, fit, lines)
+    else:
+        _write(options.output, views[0].lens, fit.orientation, field_lines(fit, fixed=True))
+    _warn(field_warnings(fit))
+
+
+def _same_pose(views: Sequence[View]) -> bool:
+    first = views[0].orientation
+    return all(
+        abs(each.orientation.height - first.height) < 1e-3
+        and abs(each.orientation.level - first.level).max() < math.radians(0.05)
+        for each in views
+    )
+
+
+def _write_correction(options: argparse.Namespace, fit: FieldFit, lines: list[str]) -> None:
+    """Write the vm.toml of a recording with the correction of [pose], and print the report."""
+    path = Path(options.source) / CONFIGURATION
+    known = read_configuration(path) if path.is_file() else Configuration()
+    pitch, roll, height = fit.errors.tolist()
+    corrected = replace(
+        known.pose,
+        add_pitch=round(known.pose.add_pitch + pitch, 5),
+        add_roll=round(known.pose.add_roll + roll, 5),
+        scale_height=round(known.pose.scale_height * (math.exp(height) if fit.scale else 1.0), 4),
+    )
+    head = "\n".join(["made by vm-calibrate", *lines, "", HEADER])
+    write_file(options.output, to_commented_toml(replace(known, pose=corrected), head).encode())
+    print("\n".join(lines))
+    print(f"{options.output}: written; its section [pose] has the correction")
+
+
+def _check_lengths(options: argparse.Namespace) -> None:
+    for name, most in (("radius", 1.0), ("line_width", 0.5)):
+        given = getattr(options, name)
+        if given is not None and not 0.0 < given <= most:
+            raise InputError(f"--{name.replace('_', '-')} must be a length above 0 and up to {most:g} m, not {given:g}")
+
+
+def _pose_options(pose: Orientation) -> str:
+    pitch, roll = math.degrees(pose.pitch), math.degrees(pose.roll)
+    return f"--height {pose.height:.2f} --pitch={pitch:.1f}deg --roll={roll:.1f}deg"
+
+
+def _radius_option(options: argparse.Namespace) -> str:
+    return "" if options.radius is None else f" --object-radius {options.radius:g}"
+
+
 def _check_lens_path(path: Path) -> None:
     """Raise InputError for a file that can't be written, or that vm-detect would read as TOML."""
     check_writable(path)
@@ -172,4 +280,5 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "lens": lens,
     "kalibr": kalibr,
     "pose": pose,
+    "photo": photo,
 }

@@ -10,6 +10,7 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.geometry.lens import Size
 
+from .field_pose import FieldFit
 from .floor_pose import PoseFit
 from .lens_fit import LensFit
 from .lens_kinds import picture_angle
@@ -75,6 +76,46 @@ def pose_lines(fit: PoseFit) -> list[str]:
     worst = sorted(fit.residuals.items(), key=lambda each: -each[1])[:3]
     lines.append("largest         " + ", ".join(f"{name} ({error:.2f} px)" for name, error in worst))
     return lines + [f"left out        {name}: {reason}" for name, reason in fit.left_out.items()]
+
+
+def field_lines(fit: FieldFit, fixed: bool) -> list[str]:
+    """The pose of a camera that does not move, or the correction of all poses; how well it is known, and from what."""
+    pitch, roll, height = fit.errors.tolist()
+    errors = np.degrees(fit.deviations[:2]).tolist()
+    pose, deviation = fit.orientation, float(fit.deviations[2])
+    if fixed:
+        lines = [
+            f"height          {_known(pose.height, deviation * pose.height, 'm')}" + ("" if fit.scale else ", guessed"),
+            f"pitch           {_known(math.degrees(pose.pitch), errors[0], 'degrees')}",
+            f"roll            {_known(math.degrees(pose.roll), errors[1], 'degrees')}",
+        ]
+    else:
+        scaled = _known(100.0 * math.expm1(height), 100.0 * deviation, "%") if fit.scale else "not determined"
+        lines = [
+            f"height off by   {scaled}",
+            f"pitch off by    {_known(math.degrees(pitch), errors[0], 'degrees')}",
+            f"roll off by     {_known(math.degrees(roll), errors[1], 'degrees')}",
+        ]
+    return [*lines, f"used            {fit.tried.lines} pieces of lines, {fit.tried.balls} balls; {_SCALES[fit.scale]}"]
+
+
+_SCALES = {
+    "balls": "the balls give the height",
+    "lines": "the width of the lines gives the height",
+    "": "nothing gives the height",
+}
+
+
+def field_warnings(fit: FieldFit) -> list[str]:
+    """What is doubtful about a pose from a field, each with what to do."""
+    warnings = []
+    if not fit.scale:
+        warnings.append(
+            "the height is only guessed from usual lines: show a ball, and give --radius; or give --line-width"
+        )
+    if (fit.deviations[:2] > math.radians(1.0)).any():
+        warnings.append("the angles are not known to 1 degree: show more lines, near and far, to both sides")
+    return warnings
 
 
 def coverage(pixels: Floats, size: Size) -> float:

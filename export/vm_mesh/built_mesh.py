@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from vm_embedded.arrays import Floats, Indices
-from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.shape import Shape
+from vm_embedded.geometry.shapes import Cylinder
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import mesh_model
 from vm_embedded.mesh.walls import wall_counts, wall_distances

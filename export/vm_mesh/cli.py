@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vm_embedded.cli.program import Parser, program
-from vm_embedded.geometry.make_shape import SHAPES
+from vm_embedded.geometry.shapes import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.bundled import DEFAULT
 from vm_workstation.commands import Commands, run_command

@@ -9,9 +9,9 @@ import numpy as np
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens import Lens
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.shapes import Cylinder
 from vm_embedded.mesh.mesh import Mesh
 from vm_workstation.plots import new_figure
 

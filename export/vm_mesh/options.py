@@ -12,11 +12,10 @@ import numpy as np
 from vm_embedded.arrays import Floats
 from vm_embedded.config.units import parse_angle, parse_length, parse_size
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens import Size
 from vm_embedded.geometry.lens_files import LensFile, read_lens_file
-from vm_embedded.geometry.make_shape import make_shape
 from vm_embedded.geometry.orientation import Orientation
+from vm_embedded.geometry.shapes import Cylinder, make_shape
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.model_file import read_model

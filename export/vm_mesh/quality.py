@@ -13,7 +13,7 @@ import numpy as np
 
 from vm_embedded.arrays import Floats
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.shapes import Cylinder
 from vm_embedded.mesh.walls import NEAREST
 
 from .built_mesh import BuiltMesh

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vm_embedded.arrays import Floats
-from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.shapes import Cylinder
 
 from .built_mesh import MeshPlan
 

@@ -23,7 +23,7 @@ from benchmarks.shipped import CANDIDATES, classes_of
 from tests.vm_train.drawn import draw_set
 from vm_embedded import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.network.bundled import model_path
 from vm_train.data.pictures import find_pictures
 from vm_train.scores.object_scores import ObjectScores

@@ -286,7 +286,7 @@ def test_the_label_chooses_the_balls_of_a_json_file(tmp_path):
 def test_options_that_do_not_belong_together_are_errors(tmp_path, capsys):
     lens = lens_file(tmp_path, LENSES["equisolid"])
     pose = ("pose", "--lens", lens, "-o", tmp_path / "lens.yaml")
-    assert "give either --balls, or --board" in run(capsys, *pose, code=1)
+    assert "give --balls, or --board" in run(capsys, *pose, code=1)
     assert "--board needs SOURCE" in run(capsys, *pose, "--board", "8x5", code=1)
     assert "--balls needs no SOURCE" in run(capsys, *pose, tmp_path, "--balls", tmp_path, code=1)
     assert "give --radius" in run(capsys, *pose, "--balls", tmp_path, code=1)

@@ -6,9 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
 
 STEPS = {
     4: ((-1, 0), (0, 1), (1, 0), (0, -1)),

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.manifests import MESHES
 from tests.vm_export.checkpoints import checkpoint, manifest
 from vm_embedded.errors import ModelError
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.manifest import LAYOUTS

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.programs import BIN, run_main
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.bundled import DEFAULT, model_path
 from vm_embedded.network.model_file import read_model

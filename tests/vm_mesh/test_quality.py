@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_mesh.built_mesh import BuiltMesh, MeshPlan
 from vm_mesh.quality import measure_links, points_on_object
 

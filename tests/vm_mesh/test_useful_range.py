@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
 from vm_mesh.built_mesh import MeshPlan
 from vm_mesh.useful_range import angular_size, useful_range
 

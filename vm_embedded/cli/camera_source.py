@@ -72,7 +72,7 @@ def samples_of(configuration: Configuration, shots: Iterable[Shot]) -> list[Samp
         lens = shot.lens or configuration.lens_for((shot.image.shape[1], shot.image.shape[0]))
         pose = shot.orientation or orientation
         if lens is not None and pose is not None:
-            samples.append(Sample(f"frame {number}", shot.image, lens, pose))
+            samples.append(Sample(f"frame {number}", shot.image, lens, pose, pose is orientation))
     return samples
 
 
@@ -81,4 +81,4 @@ def _file_samples(configuration: Configuration) -> Iterator[Sample]:
     for frame in islice(open_frames([configuration.camera.source], configuration).frames, _FRAMES):
         image = frame.read()
         lens, orientation = default.of(frame, (image.shape[1], image.shape[0]))
-        yield Sample(frame.source, image, lens, orientation)
+        yield Sample(frame.source, image, lens, orientation, orientation is default.orientation)

@@ -15,6 +15,7 @@ from ..cameras.image_files import check_read_format, open_source, open_sources
 from ..cameras.ros.bags import BagReading, is_bag, open_bag
 from ..detection.detections import Detections
 from ..detection.detector import Detector
+from ..detection.pose_check import PoseCheck
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError
 from ..files import check_not_input
@@ -152,8 +153,9 @@ class _TimedTracker:
 class _Pass:
     """All that a pass over the frames needs.
 
-    boxes, mcap, video: the files that the options ask for. remarks: collects what is strange. processed: number of
-    frames so far. replaced: the first remark about what a lens file replaces.
+    boxes, mcap, video: the files that the options ask for. remarks: collects what is strange. pose_check: collects what
+    the frames say about the pose. processed: number of frames so far. replaced: the first remark about what a lens file
+    replaces.
     """
 
     detector: Detector
@@ -165,6 +167,7 @@ class _Pass:
     mcap: McapFile | None
     video: VideoFile | None
     remarks: ClosingRemarks
+    pose_check: PoseCheck = field(default_factory=PoseCheck)
     names: FrameNames = field(default_factory=FrameNames)
     processed: int = 0
     replaced: str = ""
@@ -188,8 +191,8 @@ class _Pass:
         size = image.shape[1], image.shape[0]
         lens, orientation = self.pose.of(frame, size)
         explain = options.explain or self.boxes is not None
-        detections = self.detector.detect(image, orientation, lens, explain=explain)
-        self.remarks.add(frame.source, lens, size, detections)
+        detections = self.pose_check.update(self.detector.detect(image, orientation, lens, explain=explain))
+        self.remarks.add(frame.source, image, lens, orientation, detections, orientation is self.pose.orientation)
         if self.tracker is not None:
             detections = self.tracker.update(detections, frame)
         if self.boxes is not None:

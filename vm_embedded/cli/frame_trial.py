@@ -15,6 +15,7 @@ from typing import Any
 from ..arrays import Image
 from ..borders.text import printable
 from ..detection.detector import Detector
+from ..detection.pose_check import PoseCheck
 from ..detection.settings import Settings
 from ..errors import ModelError, VisualMeshError
 from ..geometry.lens import Lens
@@ -24,15 +25,20 @@ from ..network.model_file import ModelFile, parse_model
 from .closing_remarks import ClosingRemarks
 from .finding import BAD, GOOD, WARNING, Finding
 
+_VIEWS = 2
+"""Frames in which a better pose is sought: the time of the process is limited."""
+
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A frame of the user's, with its lens and pose. source: its name."""
+    """A frame of the user's, with its lens and pose. source: its name. is_users: the pose is the one that the user gave
+    for all frames."""
 
     source: str
     image: Image
     lens: Lens
     orientation: Orientation
+    is_users: bool
 
 
 def check_detection(model: ModelFile, settings: Settings, samples: Sequence[Sample]) -> Finding:
@@ -72,14 +78,13 @@ def _searched(path: str, content: bytes) -> dict[str, Any]:
     """For each frame: points, proposals and objects by class; and the remarks on all of them."""
     model, settings, samples = pickle.loads(content)  # the parent wrote it; the model in it is only bytes
     detector = Detector(parse_model(path, model), settings)
-    remarks, found = ClosingRemarks(detector), []
+    remarks, check, found = ClosingRemarks(detector, _VIEWS), PoseCheck(), []
     for each in samples:
         try:
-            detections = detector.detect(each.image, each.orientation, each.lens, explain=True)
+            detections = check.update(detector.detect(each.image, each.orientation, each.lens, explain=True))
         except VisualMeshError as error:
             raise ModelError(f"{each.source}: {error}") from error
-        size = each.image.shape[1], each.image.shape[0]
-        remarks.add(each.source, each.lens, size, detections)
+        remarks.add(each.source, each.image, each.lens, each.orientation, detections, each.is_users)
         found.append(detections)
     names = [each.name for each in detector.manifest.classes if each.kind == "object"]
     return {

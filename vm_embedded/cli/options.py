@@ -55,6 +55,7 @@ _FILE_ONLY = (
     *("track_wander", "track_max_speed", "track_gate", "track_forget"),
     *("camera_exposure_ms", "camera_gain", "camera_latency_ms", "camera_frozen"),
     *("pose_latency_ms", "pose_extrapolate_ms", "pose_max_age_ms", "pose_max_climb", "pose_max_turn"),
+    *("pose_add_pitch", "pose_add_roll", "pose_scale_height", "pose_correct"),
     *("recorder_memory_mib", "recorder_pause", "status_budget_ms"),
 )
 """Entries without an option: a robot sets them once, in its vm.toml."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,7 +25,7 @@ from .detection import Detection
 from .observation import Observation
 from .overhead import draw_overhead
 from .overlay import draw_overlay
-from .table import to_csv, to_row
+from .pose_state import PoseState
 
 STAGES = ("mesh", "project", "sample", "infer", "propose", "look", "cluster", "field", "track", "total")
 """Parts of the work on a frame; its time has an entry for each that was needed, and `total`."""
@@ -55,12 +57,14 @@ class Results(Record):
     """What messages have of a frame.
 
     points: number of mesh points on screen. detections: the objects, most confident first. field: features of the
-    field; only with a network that knows them. timing_ms [ms]: time of each stage and of the whole call.
+    field; only with a network that knows them. pose: what the frames so far say about the camera's pose; null if it is
+    not checked. timing_ms [ms]: time of each stage and of the whole call.
     """
 
     points: Annotated[int, SIZE]
     detections: Annotated[tuple[Detection, ...], Sent()]
     field: Annotated[FieldFeatures | None, Sent()] = None
+    pose: Annotated[PoseState | None, Sent(null=True)] = None
     timing_ms: Annotated[Mapping[str, float], Sent(least=0, allowed=STAGES)]
 
 
@@ -71,7 +75,8 @@ class Detections:
     objects: the accepted objects. rejected: the rejected candidates, each with its reason; empty unless `explain` was
     set. observation: the points. threshold: a point belongs to a class if its probability is above this. timing_ms:
     time of each stage [ms]. field: goal posts, robots, lines and border of the field; None for a network without these
-    classes, and with `field_features` off.
+    classes, and with `field_features` off. pose: what this frame and those before say about the camera's pose, if a
+    PoseCheck collects it.
     """
 
     objects: tuple[Detection, ...]
@@ -80,6 +85,7 @@ class Detections:
     threshold: float
     timing_ms: dict[str, float]
     field: FieldFeatures | None = None
+    pose: PoseState | None = None
 
     def __len__(self) -> int:
         return len(self.objects)
@@ -101,7 +107,7 @@ class Detections:
         return f"<{len(self.objects)} detections, {len(self.pixels)} points: {list(self.objects)}>"
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, timing_ms [ms].
+        """Plain numbers for JSON, with the fields of a line of vm-detect: points, detections, field, pose, timing_ms.
 
         Without field features, the key `field` is missing.
         """
@@ -253,7 +259,13 @@ class Detections:
 
 def results(found: Detections) -> Results:
     """What messages have of these detections."""
-    return Results(points=len(found.pixels), detections=found.objects, field=found.field, timing_ms=found.timing_ms)
+    return Results(
+        points=len(found.pixels),
+        detections=found.objects,
+        field=found.field,
+        pose=found.pose,
+        timing_ms=found.timing_ms,
+    )
 
 
 def edges_in_image(outline: Floats, size: tuple[int, int]) -> Floats:
@@ -286,3 +298,31 @@ def _checked_canvas(image: AnyImage, size: tuple[int, int]) -> Image:
             f"not the shape {image.shape}"
         )
     return image
+
+
+COLUMNS = (
+    *("class", "confidence", "distance", "x", "y", "z", "xmin", "ymin", "xmax", "ymax", "center_x", "center_y"),
+    *("radius", "angular_radius", "distance_by_angle", "distances_agree", "points", "track"),
+)
+"""x, y, z: of the position. xmin to ymax: the box in the image. track: its number. The rest is as in the JSON."""
+
+Row = dict[str, Any]
+
+
+def to_row(detection: Detection, box: Floats) -> Row:
+    """An object as plain numbers, one for each column. box (4,) [px]: as in Detections.xyxy."""
+    fields = detection.as_dict()
+    fields |= zip("xyz", fields["position"], strict=True)
+    fields |= zip(("xmin", "ymin", "xmax", "ymax"), box.round(1).tolist(), strict=True)
+    fields |= zip(("center_x", "center_y"), fields["center"], strict=True)
+    fields["track"] = None if detection.track is None else detection.track.id
+    return {name: fields[name] for name in COLUMNS}
+
+
+def to_csv(rows: list[Row]) -> str:
+    """A table with a line of column names, also if it has no rows."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()

@@ -16,11 +16,10 @@ from .cache import MeshCache
 from .detections import Detections
 from .field_points import locate_features
 from .objects import locate
-from .observation import Observation, observe
+from .observation import Observation, Stopwatch, observe
 from .pixel_formats import checked_image
 from .pyramid import Pyramid
 from .settings import Settings
-from .stopwatch import Stopwatch
 
 
 class Detector:

@@ -18,13 +18,12 @@ import numpy as np
 from ..arrays import Chosen, Floats, Image, Mask, Singles
 from ..network.look_contract import LookContract
 from .judging import repeated
-from .observation import Observation
+from .observation import Observation, Stopwatch
 from .peaks import LARGEST_SIZE, probability_of
 from .places import Places, PlanePlaces, mean_center
 from .prepared_view import PreparedView
 from .proposals import best_apart, propose
 from .settings import Settings
-from .stopwatch import Stopwatch
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ..geometry.planes import GROUND, Plane, Pose
 from .detection import Detection
 from .detector import Detector
 from .objects import locate
-from .stopwatch import Stopwatch
+from .observation import Stopwatch
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from time import perf_counter
 from typing import Protocol
 
 import numpy as np
@@ -13,14 +14,12 @@ from ..arrays import Floats, Indices, Mask, Singles
 from ..network.canvas_layout import CanvasLayout
 from ..network.layout import Layout
 from ..network.manifest import Manifest
-from .color_normalization import normalized
 from .peaks import Peaks, peaks_of
 from .prepared_view import PreparedView
 from .projection import Projection, project
 from .pyramid import Pyramid
-from .sampling import sample
+from .sampling import normalized, sample
 from .settings import Settings
-from .stopwatch import Stopwatch
 from .strip_sampling import sample_strips
 
 
@@ -128,3 +127,17 @@ def classify(
     answers = network.run(layout, colors, projected.on_screen)
     watch.lap("infer")
     return Observation(pyramid, view, manifest, shown, answers, watch.stages)
+
+
+class Stopwatch:
+    """Milliseconds of each stage, in the order in which the stages ended. It starts when it is made."""
+
+    def __init__(self) -> None:
+        self.stages: dict[str, float] = {}
+        self._last = perf_counter()
+
+    def lap(self, stage: str) -> None:
+        """End a stage: its time is that since the stage before ended."""
+        now = perf_counter()
+        self.stages[stage] = 1e3 * (now - self._last)
+        self._last = now

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Floats, Singles
+from ..arrays import Floats, Mask, Singles
 from .footprint import BLOCK, Levels
 from .pyramid import Pyramid
 
@@ -77,3 +77,28 @@ def _corners(pyramid: Pyramid, levels: Levels, whole: npt.NDArray[np.int32]) -> 
         cv2.remap(pyramid.level(level), table[share], None, cv2.INTER_NEAREST, dst=values[share])  # type: ignore[call-overload]
     planes = np.asarray(cv2.dnn.blobFromImage(values), dtype=np.float32)  # one for each channel
     return planes.reshape(-1, count, 2, 2, BLOCK)
+
+
+_LEAST_DEVIATION = 0.02
+"""Deviation of a picture without contrast: its noise must not become a pattern."""
+
+
+def normalized(colors: Singles, kind: str, counted: Mask | None = None) -> Singles:
+    """The colors (3, n) that a network takes, from red, green and blue (3, n), each from 0 to 1.
+
+    kind: one of manifest.POINT_COLORS. "absolute" leaves them. "relative" subtracts each channel's mean over the points
+    that are `counted` (n,), by default all, and divides by its standard deviation.
+
+    Sums are in double precision, so the digits don't depend on the order of the points.
+    """
+    if kind == "absolute":
+        return colors
+    seen = colors if counted is None else colors.compress(counted, axis=1)
+    if not seen.size:
+        return colors
+    deviations = seen.astype(np.float64)
+    mean = deviations.mean(axis=1, keepdims=True)
+    deviations -= mean
+    deviation = np.sqrt(np.square(deviations, out=deviations).mean(axis=1, keepdims=True))
+    factor = (1.0 / np.maximum(deviation, _LEAST_DEVIATION)).astype(np.float32)
+    return np.asarray((colors - mean.astype(np.float32)) * factor)

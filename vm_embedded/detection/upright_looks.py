@@ -15,11 +15,10 @@ import numpy as np
 
 from ..arrays import Singles
 from ..field.uprights import Base, apart
-from ..geometry.circle import Circle
+from ..geometry.shapes import Circle
 from .looking import Look, look_closely
-from .observation import Observation
+from .observation import Observation, Stopwatch
 from .settings import Settings
-from .stopwatch import Stopwatch
 
 _COLUMN = 0.012
 """Width of a direction [rad]."""

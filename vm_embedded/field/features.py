@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Singles
 from ..borders.records import SHARE, SIZE, Record, Sent
+from .ridge_edges import Ridges
 
 _PLACE = Sent(3, (2,))
 
@@ -108,7 +109,7 @@ class FieldFeatures(Record):
     first, as seen from the camera. robots: robots and other obstacles, nearest first. lines: straight pieces of the
     field lines, longest first; a line may have several. circle: the center circle, if the picture shows it. crossings:
     where two lines meet at a right angle. line_points (p, 2) [m]: thinned points on lines, with line_confidences (p,).
-    border: the visible border, if the picture shows it.
+    border: the visible border, if the picture shows it. ridges: the lines in the picture, to measure them.
     """
 
     posts: Annotated[tuple[Upright, ...], Sent()]
@@ -120,3 +121,4 @@ class FieldFeatures(Record):
     line_points: Floats
     line_confidences: Singles
     border: Annotated[Border | None, Sent(null=True)]
+    ridges: Ridges | None = None

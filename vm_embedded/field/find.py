@@ -11,7 +11,6 @@ from .border import find_border
 from .circle import CirclePoints, find_circle
 from .crossings import find_crossings
 from .features import Border, CenterCircle, FieldFeatures, Segment, Upright
-from .goals import pair_posts
 from .ground_points import GroundPoints, starts_of_runs
 from .lines import LEAST, LinePoints, Piece, find_pieces, line_points
 from .ridges import Profiles, pieces_on_ridges
@@ -45,7 +44,7 @@ def find_features(
     near = line_points(points)
     likely = near.part(np.flatnonzero(near.weights > LEAST))
     pieces, circle = _straight_and_round(near, likely)
-    pieces = pieces_on_ridges(pieces, points, profiles)
+    pieces, ridges = pieces_on_ridges(pieces, points, profiles)
     border = find_border(points) if "field" in points.classes else np.empty((0, 2))
     feet = {name: np.array([each.position for each in things]).reshape(-1, 2) for name, things in found.items()}
     ends = np.array([each.ends for each in pieces]).reshape(-1, 2)
@@ -68,6 +67,7 @@ def find_features(
         line_points=thinned,
         line_confidences=confidences,
         border=Border(border, border_pixels) if len(border) else None,
+        ridges=ridges,
     )
 
 
@@ -120,3 +120,25 @@ def _thinned(points: LinePoints) -> tuple[Floats, Singles]:
     columns = np.array([*points.positions.T, points.weights])[:, order]
     x, y, weights = np.add.reduceat(columns, starts, axis=1) / np.diff(starts, append=len(order))
     return np.array([x, y]).T, weights.astype(np.float32)
+
+
+_WIDTHS = (1.2, 3.4)
+"""Smallest and largest distance of a goal's posts [m]: from children's robots to those of adult size."""
+
+
+def pair_posts(posts: Sequence[Upright]) -> tuple[tuple[int, int], ...]:
+    """Indices of the left and right post of each goal, narrowest first; each post belongs to one goal at most."""
+    pairs = []
+    for number, one in enumerate(posts):
+        for before in range(number):
+            apart = float(np.hypot(*(one.position - posts[before].position)))
+            if _WIDTHS[0] <= apart <= _WIDTHS[1]:
+                pairs.append((apart, before, number))
+    found: list[tuple[int, int]] = []
+    taken: set[int] = set()
+    for _, first, second in sorted(pairs):
+        if not taken & {first, second}:
+            taken |= {first, second}
+            (x, y), (u, v) = posts[first].position, posts[second].position
+            found.append((first, second) if u * y - v * x > 0.0 else (second, first))
+    return tuple(found)

@@ -12,9 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats, Singles
+from ..arrays import Chosen, Floats, Singles
 from .ground_points import GroundPoints
 from .lines import Piece, tolerance
+from .ridge_edges import Ridges
 
 Profiles = Callable[[Floats, int], tuple[Singles, Floats]]
 """Brightness (n, count), 0 to 255, at evenly spaced places from one end to the other of each stretch (n, 2, 2) [m] on
@@ -30,14 +31,22 @@ _SHARES = np.stack([1.0 - _AT, _AT], axis=1)
 _HALF = 16
 """Samples of a profile on each side of the piece."""
 
+_SAMPLES = 2 * _HALF + 1
+
 _MARGIN = 0.12
 """How far profiles reach beyond the places where the ridge may be [m], to see what is beside it."""
 
 _SHIFTS = 7
 """Places that are tried for each end of a piece."""
 
-_TRIED = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, _SHIFTS)], indexing="ij"), axis=-1).reshape(-1, 2)
-"""Pairs (S, 2) of these places, as shares of how far the ridge may be from the ends."""
+_TRIED = np.linspace(-1.0, 1.0, _SHIFTS)
+"""These places, as shares of how far the ridge may be from the end."""
+
+_BESIDE = np.array([[-1], [0], [1]])
+"""A ridge may weave by a sample."""
+
+_SUM = np.ones(_STATIONS, np.float32)
+_MEAN = np.full(_STATIONS * _SAMPLES, 1.0 / (_STATIONS * _SAMPLES), np.float32)
 
 _TURN = 0.06
 """A piece turns by at most this much [rad]."""
@@ -67,34 +76,40 @@ _MOST_SUPPORT = 6.0
 """More support does not count."""
 
 
-def pieces_on_ridges(pieces: Sequence[Piece], points: GroundPoints, profiles: Profiles) -> list[Piece]:
-    """The pieces that points and picture speak for, moved to their ridges, in the same order.
+def pieces_on_ridges(
+    pieces: Sequence[Piece], points: GroundPoints, profiles: Profiles
+) -> tuple[list[Piece], Ridges | None]:
+    """The pieces that points and picture speak for, moved to their ridges, in the same order; and the ridges of all.
 
     points: of the frame; their spacing says how far a ridge may be. profiles: brightness of the frame.
     """
     if not pieces:
-        return []
+        return [], None
     ends = np.array([each.ends for each in pieces])  # (p, 2, 2)
-    along = ends[:, 1] - ends[:, 0]
-    lengths = np.hypot(along[:, 0], along[:, 1])
-    normals = along[:, ::-1] * (-1.0, 1.0) / lengths[:, None]
+    lengths = np.array([each.length for each in pieces])
+    normals = (ends[:, 1] - ends[:, 0])[:, ::-1] * (-1.0, 1.0) / lengths[:, None]
     free = _free_reach(ends, normals, points)
     reach = free + _MARGIN
     aside = reach[:, :, None] * normals[:, None]
     corners = np.concatenate([ends - aside, ends + aside], axis=2)  # (p, 2, 4)
-    brightness, pixels = profiles((_SHARES @ corners).reshape(-1, 2, 2), 2 * _HALF + 1)
+    brightness, pixels = profiles((_SHARES @ corners).reshape(-1, 2, 2), _SAMPLES)
     steps = reach.sum(axis=1) / (2 * _HALF)  # (p,) [m]
     middle = np.sort(pixels.reshape(-1, _STATIONS), axis=1)[:, _STATIONS // 2]
-    contrasts = _contrasts(
-        brightness.reshape(-1, _STATIONS, 2 * _HALF + 1).transpose(0, 2, 1),
-        np.maximum(_WIDTH / steps, _BLUR / np.maximum(middle, 1e-6)),
-    )
-    shifts, shares = _best_shifts(contrasts, free, lengths)
-    return [
-        replace(piece, ends=piece.ends + np.outer(shift, normal))
-        for piece, shift, normal, share in zip(pieces, shifts, normals, shares.tolist(), strict=True)
+    widths = np.maximum(_WIDTH / steps, _BLUR / np.maximum(middle, 1e-6))
+    contrasts = _contrasts(brightness.reshape(-1, _STATIONS, _SAMPLES), widths)
+    shifts, near, beside = _best_shifts(contrasts, free, lengths)
+    shown = beside.max(axis=1) > _CONTRAST
+    shares = shown.sum(axis=1) / _STATIONS
+    moved = ends + shifts[:, :, None] * normals[:, None]
+    at = near[:, 1] + beside.argmax(axis=1) - 1
+    spans = reach @ (_SHARES.T / _HALF)
+    ridges = Ridges(brightness, at, shown, spans, pixels.reshape(-1, _STATIONS), ends, normals, lengths, _AT)
+    kept = [
+        replace(piece, ends=its_ends)
+        for piece, its_ends, share in zip(pieces, moved, shares.tolist(), strict=True)
         if share + _SUPPORT_WORTH * min(piece.support, _MOST_SUPPORT) > _LEAST
     ]
+    return kept, ridges
 
 
 def _free_reach(ends: Floats, normals: Floats, points: GroundPoints) -> Floats:
@@ -104,44 +119,59 @@ def _free_reach(ends: Floats, normals: Floats, points: GroundPoints) -> Floats:
     return tolerance(outward, 0.5 * points.along(ranges), 0.5 * points.across)
 
 
+def _windows(width: int) -> Singles:
+    """Shares (N, 3 N) of all samples in the means of the left side, the ridge and the right side around each sample.
+
+    They are 0 where a side is not in the profile. width: of the ridge, in samples.
+    """
+    half, at = width // 2, np.arange(_SAMPLES)
+    off = at[:, None] - at
+    sides = [
+        (off <= -half - width) & (off > -half - 2 * width - 2),
+        np.abs(off) <= half,
+        (off >= half + width) & (off < half + 2 * width + 2),
+    ]
+    inside = np.abs(at - _HALF) <= _HALF - width - half
+    shares = [inside * side / np.maximum(side.sum(axis=0), 1) for side in sides]
+    return np.concatenate(shares, axis=1).astype(np.float32)
+
+
+_WINDOWS = np.stack([_windows(width) for width in range(1, _HALF // 4 + 1)])
+
+
 def _contrasts(brightness: Singles, widths: Floats) -> Singles:
-    """Contrast (p, N, T) of a ridge at each sample of the profiles (p, N, T) to the brighter one of its sides.
+    """Contrast (p, T, N) of a ridge at each sample of the profiles (p, T, N) to the brighter one of its sides.
 
     widths (p,): of the ridge, in samples. NaN, and a sample whose sides are not in the profile, has the contrast 0.
     """
-    count = brightness.shape[1]
-    width = np.clip(np.rint(widths), 1, _HALF // 4).astype(np.intp)
-    half = width // 2
-    hidden = np.isnan(brightness)
-    sums = np.zeros((len(widths), count + 1, brightness.shape[2]), np.float32)
-    np.cumsum(np.where(hidden, np.float32(0.0), brightness), axis=1, out=sums[:, 1:])
-    samples = np.arange(count)
-    # First sample, and the one behind the last, of the left side, the ridge and the right side around each sample.
-    edges = np.array([-half - 2 * width - 1, -half - width + 1, -half, half + 1, half + width, half + 2 * width + 2])
-    at = np.clip(edges[:, :, None] + samples, 0, count)  # (6, p, N)
-    parts = sums[np.arange(len(widths))[:, None], at]  # (6, p, N, T)
-    sizes = np.maximum(at[1::2] - at[::2], 1).astype(np.float32)
-    left, ridge, right = (parts[1::2] - parts[::2]) / sizes[..., None]
-    surroundings = sums[:, -1].sum(axis=1) / (count * brightness.shape[2]) + _DARK
-    contrasts = (ridge - np.maximum(left, right)) / surroundings[:, None, None]
-    contrasts[hidden | (np.abs(samples - _HALF) > _HALF - (width + half)[:, None])[..., None]] = 0.0
-    return np.asarray(np.clip(contrasts, *_LIMITS))
+    shown = brightness == brightness
+    values = np.where(shown, brightness, np.float32(0.0))
+    width = np.minimum(np.maximum(np.rint(widths), 1.0), len(_WINDOWS)).astype(np.intp)
+    left, ridge, right = (values @ _WINDOWS[width - 1]).reshape(*values.shape[:2], 3, _SAMPLES).transpose(2, 0, 1, 3)
+    contrasts = ridge - np.maximum(left, right)
+    contrasts /= (values.reshape(len(values), -1) @ _MEAN + np.float32(_DARK))[:, None, None]
+    contrasts *= shown
+    return np.asarray(np.minimum(np.maximum(contrasts, _LIMITS[0]), _LIMITS[1]))
 
 
-def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Floats, Floats]:
-    """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, and the share of stations (p,) with
-    a ridge there.
+def _best_shifts(contrasts: Singles, free: Floats, lengths: Floats) -> tuple[Floats, Chosen, Singles]:
+    """Shifts (p, 2) [m] of the ends of pieces that have the highest mean contrast, the positions (p, 3, T) of the
+    samples there and beside, and their contrasts (p, 3, T).
 
-    contrasts (p, N, T): see _contrasts. free (p, 2) [m]: how far the ridge may be from the ends. lengths (p,) [m]: of
+    contrasts (p, T, N): see _contrasts. free (p, 2) [m]: how far the ridge may be from the ends. lengths (p,) [m]: of
     the pieces.
     """
-    shifts = _TRIED * free[:, None]  # (p, S, 2)
+    count = len(free)
     spans = (free + _MARGIN) @ (_SHARES.T / _HALF)  # (p, T): of a sample
-    samples = np.rint((shifts @ _SHARES.T) / spans[:, None]).astype(np.intp) + _HALF  # (p, S, T)
-    rows, stations = np.arange(len(free)), np.arange(_STATIONS)
-    totals = contrasts[rows[:, None, None], samples, stations].sum(axis=2)
-    totals[np.abs(shifts[:, :, 1] - shifts[:, :, 0]) > _TURN * lengths[:, None]] = -np.inf
-    best = np.argmax(totals, axis=1)
-    near = samples[rows, best][:, None] + np.array([[-1], [0], [1]])  # (p, 3, T): the ridge may weave by a sample
-    shown = contrasts[rows[:, None, None], np.clip(near, 0, 2 * _HALF), stations].max(axis=1)
-    return shifts[rows, best], np.count_nonzero(shown > _CONTRAST, axis=1) / _STATIONS
+    farthest = free.T[:, :, None] * _SHARES.T[:, None] / spans  # (2, p, T): in samples, for each end
+    one, other = farthest[:, :, None] * _TRIED[:, None]  # (p, S, T)
+    places = (one[:, :, None] + other[:, None] + (_HALF + 0.5)).astype(np.intp)  # (p, S, S, T)
+    places += np.arange(0, contrasts.size, _SAMPLES).reshape(count, 1, 1, _STATIONS)
+    totals = (contrasts.take(places).reshape(-1, _STATIONS) @ _SUM).reshape(-1, _SHIFTS, _SHIFTS)
+    one, other = free.T[:, :, None] * _TRIED  # (p, S): [m]
+    totals[np.abs(one[:, :, None] - other[:, None]) > (_TURN * lengths)[:, None, None]] = -np.inf
+    best = totals.reshape(count, -1).argmax(axis=1)
+    rows = np.arange(count)
+    near = places.reshape(count, -1, _STATIONS)[rows, best][:, None] + _BESIDE  # (p, 3, T)
+    beside = contrasts.take(near, mode="clip")  # the first and the last sample have the contrast 0
+    return np.array([one[rows, best // _SHIFTS], other[rows, best % _SHIFTS]]).T, near, beside

@@ -137,6 +137,13 @@ class Orientation:
         rotation = rotation_from_quaternion(quaternion)
         return cls(height, rotation @ OPTICAL_TO_CAMERA.T if optical else rotation)
 
+    def adjusted(self, pitch: float, roll: float, scale: float) -> Orientation:
+        """This orientation with angles added [rad], and with the height times `scale`. The yaw stays.
+
+        Raises GeometryError for numbers that are not finite, and for a scale that is not above 0.
+        """
+        return Orientation.from_roll_pitch(self.height * scale, self.roll + roll, self.pitch + pitch, self.yaw)
+
     @cached_property
     def yaw(self) -> float:
         """Angle of the optical axis around the vertical [rad].

@@ -11,6 +11,7 @@ import cv2
 from ..cameras.camera import Shot
 from ..detection.detections import Detections
 from ..detection.detector import Detector
+from ..detection.pose_check import PoseCheck
 from ..detection.tracker import Tracker
 from ..errors import InputError, VisualMeshError, one_line
 from ..geometry.lens import Lens
@@ -21,6 +22,9 @@ from .configuration import Configuration
 from .counters import Counters
 from .frame_watchdog import FrameWatchdog
 from .health import Health
+
+_EVERY = 3
+"""Only each third frame tells about the pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +53,12 @@ class Answerer:
         self.configuration, self.detector = configuration, detector
         self._poses, self._counters, self._health, self._watchdog = poses, counters, health, watchdog
         self._tracker = Tracker(configuration.track)
+        self.pose_check = PoseCheck(_EVERY, configuration.pose.correct)
 
     def reload(self, configuration: Configuration, detector: Detector) -> None:
-        """Use another configuration and its detector from now on. Tracks continue."""
+        """Use another configuration and its detector from now on. Tracks continue; the pose is checked anew."""
         self.configuration, self.detector = configuration, detector
+        self.pose_check = PoseCheck(_EVERY, configuration.pose.correct)
         self._tracker.settings = configuration.track
 
     async def answer(self, shot: Shot) -> Answer | None:
@@ -60,11 +66,12 @@ class Answerer:
         if self._refuse_late(shot):
             return None
         try:
-            lens, orientation = self._lens(shot), await self._orientation(shot)
+            lens, given = self._lens(shot), await self._orientation(shot)
+            orientation = self.pose_check.corrected(given)
             self._health.pose_trouble = ""
             started = time.perf_counter()
             with self._watchdog.frame():
-                detections = self.detector.detect(shot.image, orientation, lens)
+                detections = self.pose_check.update(self.detector.detect(shot.image, orientation, lens))
             if self.configuration.track.on:
                 detections = self._tracker.update(detections, shot.captured)
         except StalePoseError as error:
@@ -142,4 +149,4 @@ class Answerer:
                 await asyncio.wait_for(arrived.wait(), left)
             except asyncio.TimeoutError:
                 break
-        return poses.at(shot.captured)
+        return settings.corrected(poses.at(shot.captured))

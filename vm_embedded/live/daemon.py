@@ -26,6 +26,7 @@ from ..cameras.grabber import Grabber
 from ..cameras.open_camera import Opener
 from ..detection.detector import Detector
 from ..errors import InputError, NetworkError, VisualMeshError, one_line
+from ..geometry.orientation import Orientation
 from ..output.channels import Channels
 from ..output.messages import LiveFrame, Message, live_frame, state_message
 from ..output.recorder import Moment, Recorder
@@ -123,7 +124,7 @@ class Daemon:
         self._counters = Counters(self._grabber, self._poses, self._outputs)
         self._watchdog = FrameWatchdog(self._end_hanging)
         self.answerer = Answerer(configuration, detector, self._poses, self._counters, self._health, self._watchdog)
-        self._remarks = FrameRemarks()
+        self._remarks = FrameRemarks(_fixed_pose(configuration))
         self._state = DaemonState(self._health, self._grabber, self._outputs, log, self._notifier)
         self.page = StatusPage(self.answerer, self._status, self._record, self._metrics, self._use_threshold)
         commands = {"status": lambda: to_json(self._status(), allow_nan=False), "record": self._record}
@@ -309,7 +310,8 @@ class Daemon:
 
     def _metrics(self) -> str:
         """All metrics in Prometheus's text format."""
-        return self._counters.metrics(self._state.name, self.answerer.detector.cache, self._health.answered)
+        pose = self.answerer.pose_check.state
+        return self._counters.metrics(self._state.name, self.answerer.detector.cache, self._health.answered, pose)
 
     def _begin_recording_anew(self) -> None:
         """Let recordings have the current configuration and network."""
@@ -352,7 +354,7 @@ class Daemon:
             self._log("other classes", "warning", before=had, now=has)
         self.answerer.reload(new.configuration, new.detector)
         self._begin_recording_anew()
-        self._remarks = FrameRemarks()
+        self._remarks = FrameRemarks(_fixed_pose(new.configuration))
         give_back_memory()
         self._log("reloaded", model=new.configuration.model, proved=new.proved, needs_restart=new.needs_restart)
 
@@ -382,3 +384,8 @@ class Daemon:
         await self._recorder.close(_RECORDING_S)
         self._grabber.stop(0.3)
         self._notifier.close()
+
+
+def _fixed_pose(configuration: Configuration) -> Orientation | None:
+    """The pose of a configuration that gives one for all frames."""
+    return configuration.fixed_orientation() if configuration.pose.source == "fixed" else None

@@ -9,8 +9,8 @@ from typing import Any
 from ..detection.detections import Detections
 from ..detection.detector import Detector
 from ..detection.objects import locate
+from ..detection.observation import Stopwatch
 from ..detection.settings import Settings
-from ..detection.stopwatch import Stopwatch
 from ..errors import InputError
 
 _WORTH_SHOWING = 0.05

@@ -17,8 +17,8 @@ import numpy as np
 
 from ..arrays import Floats, Indices, frozen
 from ..errors import GeometryError
-from ..geometry.cylinder import Cylinder
 from ..geometry.shape import Shape
+from ..geometry.shapes import Cylinder
 from .grids import STEPS, row_groups
 from .mesh import Mesh, MeshModel, check_size, rays_from_polar
 

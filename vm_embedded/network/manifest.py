@@ -13,8 +13,8 @@ from types import UnionType
 
 from ..borders.text import name_fault
 from ..errors import GeometryError, InputError, ModelError, unknown
-from ..geometry.make_shape import SHAPES, make_shape
 from ..geometry.shape import Shape
+from ..geometry.shapes import SHAPES, make_shape
 from ..mesh.mesh import MeshModel
 from ..mesh.models import MESH_MODELS
 from ..mesh.walls import wall_counts
@@ -41,7 +41,7 @@ for; see detection/footprint.py."""
 
 POINT_COLORS = ("absolute", "relative")
 """Colors that the network takes. absolute: from 0 to 1. relative: normalized with the mean and the deviation of the
-picture's points; see detection/color_normalization.py."""
+picture's points; see detection/sampling.py."""
 
 _LARGEST = 1e9
 """Limit of every radius, distance, number of rings and number of operations."""

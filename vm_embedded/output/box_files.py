@@ -26,9 +26,9 @@ from ..errors import InputError, VisualMeshError, unknown
 from ..files import exists, read_bytes, read_text, write_file
 from ..geometry.lens import Lens
 from ..geometry.lens_files import format_lens_file
-from ..geometry.make_shape import make_shape
 from ..geometry.orientation import Orientation
 from ..geometry.shape import Shape
+from ..geometry.shapes import make_shape
 from ..network.manifest import Manifest
 from .result_files import FrameNames, encode_png, make_folder
 

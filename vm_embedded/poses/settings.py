@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import Field, dataclass
 from typing import Any
 
 from ..borders.sockets import parse_address
-from ..config.entries import check_entries, entry, number, one_of
+from ..config.entries import check_entries, entry, number, one_of, switch
+from ..config.units import angle
 from ..errors import InputError
+from ..geometry.orientation import Orientation
 
 CLOCKS = ("monotonic", "wall", "arrival")
 FRAMES = ("camera", "optical")
+
+_ADDED = (-math.radians(45.0), math.radians(45.0))
+"""Limits of corrections [rad]."""
 
 UDP_EXAMPLE = "0.0.0.0:5600"
 """Address to receive poses at, for error messages."""
@@ -71,5 +77,21 @@ class PoseSettings:
         30.0, "a pose is rejected if its gravity direction turns faster than this", "rad/s", (0.1, 1000)
     )
 
+    add_pitch: float = angle(
+        0.0, "added to the pitch of each pose, in radians or with deg; vm-calibrate pose finds it", _ADDED
+    )
+    add_roll: float = angle(0.0, "added to the roll of each pose, in radians or with deg", _ADDED)
+    scale_height: float = number(1.0, "factor for the height of each pose", "", (0.5, 2.0))
+    correct: bool = switch(
+        False,
+        "slowly correct all poses by what lines and balls show, by at most 3 degrees and 10 %; messages say how much",
+    )
+
     def __post_init__(self) -> None:
         check_entries(self)
+
+    def corrected(self, orientation: Orientation) -> Orientation:
+        """A pose with the corrections. A fixed pose needs none."""
+        if not (self.add_pitch or self.add_roll) and self.scale_height == 1.0:
+            return orientation
+        return orientation.adjusted(self.add_pitch, self.add_roll, self.scale_height)

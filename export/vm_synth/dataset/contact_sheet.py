@@ -14,10 +14,9 @@ import numpy as np
 from vm_embedded.arrays import Floats, Image
 from vm_embedded.cameras.image_files import read_image
 from vm_embedded.errors import GeometryError, InputError, one_line
-from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.geometry.shape import Shape
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Cylinder, Sphere
 from vm_workstation.contact_sheet import (
     FAINT_INK,
     GAP,

@@ -11,8 +11,7 @@ from pathlib import Path
 from vm_embedded.cli.program import EXIT_OK, Parser
 from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
-from vm_embedded.geometry.make_shape import make_shape
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere, make_shape
 from vm_embedded.network.bundled import SHIPPED
 from vm_workstation.option_types import add_set
 from vm_workstation.text_tables import shortened

@@ -20,14 +20,13 @@ from vm_embedded.detection.detector import Detector
 from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.looking import Look, chain_of, look_at, worth_of
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Network, Observation, classify
+from vm_embedded.detection.observation import Network, Observation, Stopwatch, classify
 from vm_embedded.detection.places import PlanePlaces
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection
 from vm_embedded.detection.proposals import propose
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import InputError
 from vm_embedded.field.features import FieldFeatures
 from vm_embedded.files import read_bytes

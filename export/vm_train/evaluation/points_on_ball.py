@@ -15,7 +15,7 @@ from vm_embedded.arrays import Floats, Mask, frozen
 from vm_embedded.detection.projection import project
 from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.orientation import Orientation
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.mesh import Mesh
 
 from ..graphs.hexagonal import HexagonalMesh

@@ -18,7 +18,7 @@ from vm_embedded.geometry.lens import Lens, Size
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.shape import Shape
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 
 from ..boxes.box import Box, BoxedPicture
 from ..boxes.whole import cut_edges, whole_object

@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Indices, Mask, Singles
-from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.footprint import Levels, levels_for, uniform_levels
 from vm_embedded.detection.pyramid import Pyramid
-from vm_embedded.detection.sampling import sample
+from vm_embedded.detection.sampling import normalized, sample
 from vm_embedded.mesh.mesh import STRIDE, PointGraph
 from vm_embedded.network.layout import OFF_SCREEN
 from vm_embedded.network.manifest import Manifest

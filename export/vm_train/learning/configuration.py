@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from vm_embedded.config.entries import check_entries, number, one_of, share
 from vm_embedded.errors import InputError
 from vm_embedded.field.uprights import KINDS
-from vm_embedded.geometry.make_shape import SHAPES
+from vm_embedded.geometry.shapes import SHAPES
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import POINT_COLORS, POINT_SAMPLINGS, Manifest
 from vm_export.canvas_shape import CanvasShape

@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.detection.looking import look_closely
+from vm_embedded.detection.observation import Stopwatch
 from vm_embedded.detection.patches import Tangents
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.network.look_contract import LookContract
 from vm_export.look_network import LookNetwork

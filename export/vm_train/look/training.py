@@ -4,33 +4,37 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
-from dataclasses import asdict, replace
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
+from pathlib import Path
 
 import numpy as np
 import torch
 
 from vm_embedded import __version__
-from vm_embedded.arrays import Image, Singles
+from vm_embedded.arrays import Image, Mask, Singles
 from vm_embedded.borders.text import printable
+from vm_embedded.errors import InputError
 from vm_embedded.files import write_file
 from vm_embedded.network.look_contract import LookContract
 from vm_export.eight_bits import round_kernels
 from vm_export.look_checkpoint import LookCheckpoint
 from vm_export.look_network import LookNetwork
+from vm_workstation.text_tables import shortened
 
 from ..runs.hardware import Hardware
 from ..runs.learner import DivergedError
 from ..runs.loop import Progress, Training, Validation, shown
 from ..scores.calibration import Calibration
+from .collection import collect_patches
 from .judging import judge_validation
 from .labels import OBJECT
-from .patch_set import PatchSet
+from .patch_set import PatchChunk, PatchSet
 from .run import LookRun
 from .scores import LookResult, LookScore, logits_of
 from .trainer import LookTrainer
-from .training_patches import TrainingPatches, collect
 
 _EXAMPLES = 2
 """Patches with an object, and as many without, for the self-test of the model file."""
@@ -177,3 +181,76 @@ def _examples(validation: PatchSet, presence: Singles) -> Image:
         start = min(len(surest) // 20, max(len(surest) - _EXAMPLES, 0))
         chosen += surest[start : start + _EXAMPLES].tolist()
     return validation.patches[chosen]
+
+
+_NAMED = 20
+"""Pictures that can't be used, to name."""
+
+
+@dataclass(frozen=True)
+class TrainingPatches:
+    """The patches of a run: for training, and proposals for validation. objects: in validation pictures; proposed: of
+    these, those that some proposal is at."""
+
+    training: PatchSet
+    validation: PatchSet
+    objects: int
+    proposed: int
+
+    @property
+    def pictures(self) -> int:
+        """Number of training pictures with patches."""
+        return len(np.unique(self.training.pictures))
+
+
+def collect(run: LookRun, workers: int, stopped: Callable[[], bool]) -> TrainingPatches:
+    """Collect the patches of a run, or read those that are collected, and name the pictures that can't be used.
+
+    stopped: whether to stop, which raises KeyboardInterrupt. Raises InputError and VisualMeshError.
+    """
+    with shown(len(run.numbers), stopped) as report:
+        paths = collect_patches(run, workers, report)
+    # The patches may fill a large part of the memory: the first pass counts them, the second one keeps them.
+    counts = {False: 0, True: 0}
+    objects = proposed = 0
+    faults: list[str] = []
+    for validates, chunk in _chunks(run, paths):
+        objects, proposed = objects + chunk.objects, proposed + chunk.proposed
+        faults += chunk.faults
+        for part in counts:
+            counts[part] += int((validates == part).sum())
+    for line in shortened(faults, _NAMED, " pictures can't be used"):
+        print(f"vm-train: {line}", file=sys.stderr)
+    sets = {part: PatchSet.empty(run.configuration.patches.size, count) for part, count in counts.items()}
+    ends = {False: 0, True: 0}
+    for validates, chunk in _chunks(run, paths):
+        for part in sets:
+            ends[part] = sets[part].write(ends[part], chunk.patches.part(validates == part))
+    _check(run, sets[False], "training")
+    _check(run, sets[True], "validation")
+    return TrainingPatches(sets[False], sets[True], objects, proposed)
+
+
+def _chunks(run: LookRun, paths: Sequence[Path]) -> Iterator[tuple[Mask, PatchChunk]]:
+    """Each file of patches, and which of its patches (n,) are for validation."""
+    numbers = set(run.split.validation)
+    validates = np.array([each in numbers for each in run.numbers])
+    for path in paths:
+        chunk = PatchChunk.load(path)
+        yield validates[chunk.patches.pictures], chunk
+
+
+def _check(run: LookRun, part: PatchSet, name: str) -> None:
+    """Raise InputError if a part has no patch with, or none without, an object."""
+    if not len(part):
+        raise InputError(
+            f"no picture for {name} can be used; vm-train check {run.data} tells why (if the masks have other colors, "
+            "give them in [classes] of --config)"
+        )
+    if not 0 < part.objects < len(part):
+        found = "none" if not part.objects else "all"
+        raise InputError(
+            f"{found} of the {len(part)} patches for {name} show the object {run.object_class}: the close look needs "
+            f"both; give more pictures if they are few, or check {run.data} with vm-train check, and that {run.model} "
+            "proposes objects in it"
+        )

@@ -14,9 +14,8 @@ import numpy as np
 from vm_embedded.arrays import Floats, Mask
 from vm_embedded.errors import InputError
 from vm_embedded.files import exists, read_regular
-from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.shape import Shape
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Cylinder, Sphere
 from vm_embedded.network.manifest import Manifest
 from vm_workstation.class_names import class_name
 from vm_workstation.outlines import polygon_area, shape_outline

@@ -11,7 +11,7 @@ import numpy as np
 
 from vm_embedded.cameras.image_files import natural_key
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.network.manifest import Manifest
 
 from ..boxes.box import BoxedPicture, BoxedSet

@@ -54,7 +54,7 @@ def test_the_balls_of_the_drawn_frames_are_found():
 
 def test_a_line_has_what_the_documentation_says():
     (line,) = lines(detect(IMAGES[0]))
-    assert list(line) == ["frame", "source", "stamp", "points", "detections", "field", "timing_ms"]
+    assert list(line) == ["frame", "source", "stamp", "points", "detections", "field", "pose", "timing_ms"]
     assert line["frame"] == 0
     assert line["source"] == IMAGES[0].name
     assert line["stamp"] is None

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.color_normalization import normalized
 from vm_embedded.detection.detector import Detector
+from vm_embedded.detection.sampling import normalized
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.geometry.orientation import Orientation

@@ -22,7 +22,7 @@ from vm_embedded import (
     Track,
     read_lens_file,
 )
-from vm_embedded.detection.table import COLUMNS
+from vm_embedded.detection.detections import COLUMNS
 from vm_embedded.network.manifest import ObjectClass
 
 LENS = IMAGES[0].with_name(IMAGES[0].name.replace("image", "lens")).with_suffix(".yaml")
@@ -50,7 +50,7 @@ def test_printed_detections_are_short(detections):
 
 def test_detections_as_json_are_those_of_vm_detect(detections):
     data = json.loads(json.dumps(detections.as_dict(), allow_nan=False))
-    assert list(data) == ["points", "detections", "field", "timing_ms"]
+    assert list(data) == ["points", "detections", "field", "pose", "timing_ms"]
     assert data["points"] == len(detections.pixels)
     assert [each["class"] for each in data["detections"]] == [each.class_name for each in detections]
 

@@ -17,10 +17,9 @@ from vm_embedded.detection.footprint import levels_for
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import MESH_MODELS
-from vm_embedded.network.choose_layout import choose_layout
+from vm_embedded.network.choose_layout import PlainLayout, choose_layout
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
-from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_export.checkpoint import Checkpoint
 from vm_export.export import export

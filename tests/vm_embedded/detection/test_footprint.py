@@ -9,7 +9,7 @@ from vm_embedded.detection.footprint import BLOCK, Levels, footprint_widths, lev
 from vm_embedded.detection.pixel_formats import checked_image
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.sampling import sample
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 
 spheres = st.builds(Sphere, st.floats(0.03, 0.12))

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from vm_embedded.detection.looking import look_at
 from vm_embedded.detection.objects import locate
+from vm_embedded.detection.observation import Stopwatch
 from vm_embedded.detection.places import PlanePlaces, mean_center
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.network.look_contract import LookContract
 
 from ..strategies import seeds

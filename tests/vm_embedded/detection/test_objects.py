@@ -10,18 +10,16 @@ from hypothesis import strategies as st
 
 from tests.manifests import ball_manifest
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Observation
+from vm_embedded.detection.observation import Observation, Stopwatch
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection, project, to_camera
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
-from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Sphere
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.plain_layout import PlainLayout
+from vm_embedded.network.choose_layout import PlainLayout
 
 SIZE = (1280, 1024)
 PICTURE = Pyramid(np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8), "bgr")

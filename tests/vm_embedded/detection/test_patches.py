@@ -10,8 +10,8 @@ from vm_embedded.detection.patches import Tangents, cut_patches, patch_nodes, sa
 from vm_embedded.detection.pixel_formats import FORMATS, checked_image
 from vm_embedded.detection.projection import to_camera
 from vm_embedded.detection.pyramid import Pyramid
-from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
+from vm_embedded.geometry.shapes import Cylinder
 
 from .views import SIZE, center_at, picture_of, view_at
 

@@ -14,18 +14,16 @@ from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.field_points import locate_features
 from vm_embedded.detection.looking import look_closely
 from vm_embedded.detection.objects import locate
-from vm_embedded.detection.observation import Observation, observe
+from vm_embedded.detection.observation import Observation, Stopwatch, observe
 from vm_embedded.detection.prepared_view import PreparedView
 from vm_embedded.detection.projection import Projection, project
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.detection.settings import Settings
-from vm_embedded.detection.stopwatch import Stopwatch
 from vm_embedded.detection.upright_looks import find_bases
 from vm_embedded.detection.upright_peaks import peak_bases
-from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Sphere
 from vm_embedded.mesh.grids import STEPS
 from vm_embedded.mesh.mesh import Mesh, rays_from_polar
 from vm_embedded.network.canvas_layout import CanvasLayout

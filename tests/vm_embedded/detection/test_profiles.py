@@ -6,8 +6,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from vm_embedded.detection.field_points import brightness_along
 from vm_embedded.detection.pixel_formats import checked_image
-from vm_embedded.detection.profiles import brightness_along
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.radial_lenses import Equidistant, Rectilinear
 

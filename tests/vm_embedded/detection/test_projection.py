@@ -10,7 +10,7 @@ from vm_embedded.geometry.calibrated_lenses import BrownLens, FisheyeLens
 from vm_embedded.geometry.lens_files import read_lens_file
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 
 from ..strategies import (

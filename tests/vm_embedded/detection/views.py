@@ -9,9 +9,9 @@ from vm_embedded.detection.projection import project
 from vm_embedded.detection.pyramid import Pyramid
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
-from vm_embedded.network.plain_layout import PlainLayout
+from vm_embedded.network.choose_layout import PlainLayout
 
 SIZE = (640, 512)
 BALL = Sphere(0.1)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.field.crossings import find_crossings
 from vm_embedded.field.features import Segment, Upright
-from vm_embedded.field.goals import pair_posts
+from vm_embedded.field.find import pair_posts
 
 from .ground import turned
 

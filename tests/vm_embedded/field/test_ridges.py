@@ -5,10 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vm_embedded.field import ridges
 from vm_embedded.field.lines import Piece
-from vm_embedded.field.ridges import pieces_on_ridges
 
 from .ground import ground, mesh, near_segment, turned
+
+
+def pieces_on_ridges(*given):
+    return ridges.pieces_on_ridges(*given)[0]
+
 
 FIELD = ground(mesh(), np.full(len(mesh()), "field"))
 
@@ -84,3 +89,27 @@ def test_brightness_of_the_picture_hardly_matters():
 
 def test_no_pieces_need_no_picture():
     assert pieces_on_ridges([], FIELD, picture()) == []
+
+
+@given(
+    angle=st.floats(-3.1, 3.1),
+    width=st.floats(0.05, 0.11),
+    shifts=st.tuples(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05)),
+)
+def test_edges_tell_the_width_of_a_line_and_its_direction(angle, width, shifts):
+    true = np.array([[1.2, -0.8], [1.2, 0.8]])
+    off = true + np.array([[shifts[0], 0.0], [shifts[1], 0.0]])
+    found = ridges.pieces_on_ridges([piece(*(off @ turned(angle)))], FIELD, picture(true @ turned(angle), width=width))
+    ends, turn_errors, widths = found[1].measured()
+    assert np.abs(ends[0] @ turned(-angle) - true)[:, 0].max() < 0.012
+    assert turn_errors[0] < 0.02
+    assert widths[0] == pytest.approx(width, rel=0.25)
+
+
+def test_a_line_without_edges_is_not_measured():
+    def flat(stretches, count):
+        return np.full((len(stretches), count), 90.0, np.float32), np.full(len(stretches), 3.0)
+
+    assert all(
+        len(each) == 0 for each in ridges.pieces_on_ridges([piece((2.0, -1.0), (2.0, 1.0))], FIELD, flat)[1].measured()
+    )

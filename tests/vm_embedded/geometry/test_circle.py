@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.circle import Circle
+from vm_embedded.geometry.shapes import Circle
 
 from ..strategies import reals
 

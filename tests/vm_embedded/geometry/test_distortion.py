@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given
 
-from vm_embedded.geometry.distortion import distort, monotone_radius, undistort
+from vm_embedded.geometry.radial_lenses import distort, monotone_radius, undistort
 
 from ..strategies import RADIUS, distortions, reals, seeds
 

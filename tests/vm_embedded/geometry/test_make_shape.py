@@ -1,10 +1,7 @@
 import pytest
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.make_shape import make_shape
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere, make_shape
 
 
 @pytest.mark.parametrize(("name", "kind"), [("circle", Circle), ("sphere", Sphere), ("Sphere", Sphere)])

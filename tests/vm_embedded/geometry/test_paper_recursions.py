@@ -7,8 +7,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Sphere
 
 from ..strategies import reals
 from .paper_recursions import circle_dtheta, circle_phi1, repeat, sample_radius, sphere_phi_1

@@ -6,8 +6,15 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.distortion import monotone_radius, undistort
-from vm_embedded.geometry.radial_lenses import PROJECTIONS, Equidistant, Equisolid, Rectilinear, projection_named
+from vm_embedded.geometry.radial_lenses import (
+    PROJECTIONS,
+    Equidistant,
+    Equisolid,
+    Rectilinear,
+    monotone_radius,
+    projection_named,
+    undistort,
+)
 
 from ..strategies import RADIUS, SIZE, radial_lenses, rays_at, rays_within, reals, seeds
 

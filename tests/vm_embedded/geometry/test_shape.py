@@ -6,11 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.make_shape import SHAPES
 from vm_embedded.geometry.shape import tangents
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import SHAPES, Circle, Cylinder, Sphere
 
 from ..strategies import random_direction, reals, seeds
 

@@ -93,7 +93,7 @@ def test_a_robot_that_has_seen_the_plane_may_look_up():
     def events(*points):
         """The events of answers a second apart that have so many points."""
         watch = FrameRemarks()
-        shot, shown = Shot(image, 0.0), [SimpleNamespace(pixels=range(count)) for count in points]
+        shot, shown = Shot(image, 0.0), [SimpleNamespace(pixels=range(count), pose=None) for count in points]
         found = [watch.about(Answer(shot, lens, None, each, 7.0 + at)) for at, each in enumerate(shown)]
         return [event for each in found for event, _ in each]
 
@@ -107,6 +107,6 @@ def test_a_robot_that_has_seen_the_plane_may_look_up():
 def test_a_raw_lens_on_a_topic_of_rectified_images_is_said(topic, distortion):
     lens = Rectilinear(focal_length=400.0, fov=1.5, distortion=distortion)
     shot = Shot(np.zeros((512, 640, 3), np.uint8), 0.0, topic=topic)
-    found = list(FrameRemarks().about(Answer(shot, lens, None, SimpleNamespace(pixels=range(9)), 7.0)))
+    found = list(FrameRemarks().about(Answer(shot, lens, None, SimpleNamespace(pixels=range(9), pose=None), 7.0)))
     assert [event for event, _ in found] == ["doubtful lens"] * ("rect" in topic and distortion[0] > 0.0)
     assert all(topic in reason for _, reason in found)

@@ -150,6 +150,7 @@ def test_figures_are_given_by_address_only_and_nothing_else_is(tmp_path):
         text = asked(b"GET /metrics HTTP/1.1\r\nHost: 127.0.0.1:1\r\n\r\n")
         assert text.startswith("HTTP/1.1 200 OK")
         assert 'vm_state{state="ok"} 1' in text
+        assert 'vm_pose{pose="unknown"} 1' in text
         figures = dict(line.rsplit(" ", 1) for line in text.splitlines() if line.startswith("vm_"))
         assert float(figures["vm_frames_total"]) >= 5
         assert float(figures['vm_stage_seconds_count{stage="infer"}']) == float(figures["vm_frames_total"])

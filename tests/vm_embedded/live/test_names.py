@@ -85,7 +85,7 @@ class Readers:
                 (rest,) = struct.unpack("<I", stream.read(4))
                 body = stream.read(rest)
                 assert len(body) == rest, "the binary form has ended"
-                (size,) = struct.unpack_from("<I", body, 124 - 4)
+                (size,) = struct.unpack_from("<I", body, 128 - 4)
                 text = body[len(body) - size :].decode()
                 if body[8 - 4]:  # a frame
                     self.names = tuple(text.split("\n"))

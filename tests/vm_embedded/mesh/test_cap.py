@@ -6,9 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
 from vm_embedded.mesh.models import build_mesh
 
 from ..brute_force import plain_rings, reached

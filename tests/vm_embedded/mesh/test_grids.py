@@ -6,9 +6,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
 from vm_embedded.mesh.models import build_mesh
 
 from ..brute_force import STEPS, center_height, plain_grid, plain_position

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import build_mesh
 

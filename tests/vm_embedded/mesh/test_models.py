@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Cylinder, Sphere
 from vm_embedded.mesh.grids import KINDS
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh, mesh_model
 

@@ -8,9 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
 from vm_embedded.mesh.mesh import STRIDE
 from vm_embedded.mesh.models import build_mesh, mesh_model
 from vm_embedded.mesh.octaves import BLOCK, GAP

@@ -6,9 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import GeometryError, InputError
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.cylinder import Cylinder
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Cylinder, Sphere
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 
 from ..brute_force import plain_mesh, reached

@@ -12,7 +12,7 @@ from vm_embedded.detection.projection import project
 from vm_embedded.detection.settings import Settings
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh, mesh_model
 from vm_embedded.mesh.octaves import BLOCK, GAP
 from vm_embedded.network.canvas_layout import SMALLEST, CanvasLayout, pack

@@ -12,15 +12,13 @@ from hypothesis import strategies as st
 from tests.manifests import ball_manifest
 from vm_embedded.detection.projection import project
 from vm_embedded.errors import ModelError
-from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Sphere
 from vm_embedded.mesh.mesh import SELF, Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
-from vm_embedded.network.choose_layout import choose_layout
+from vm_embedded.network.choose_layout import PlainLayout, choose_layout
 from vm_embedded.network.model_file import ModelFile
-from vm_embedded.network.plain_layout import PlainLayout
 from vm_embedded.network.runs_layout import RunsLayout
 from vm_embedded.network.session import Session
 from vm_export.export import onnx_model

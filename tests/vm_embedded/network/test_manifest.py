@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 from tests.looks import look_contract
 from tests.manifests import MESHES, ball_manifest
 from vm_embedded.errors import GeometryError, InputError, ModelError
-from vm_embedded.geometry.circle import Circle
-from vm_embedded.geometry.make_shape import SHAPES
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import SHAPES, Circle, Sphere
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_embedded.network.manifest import (
     EDGES,

@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 
 from vm_embedded.detection.cache import MeshCache
 from vm_embedded.detection.settings import Settings
-from vm_embedded.geometry.circle import Circle
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Circle, Sphere
 from vm_embedded.mesh.mesh import SELF, Mesh
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network import runs_layout

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.drawn_scenes import FOLDER
 from vm_embedded import Detector, Settings, read_lens_file
 from vm_embedded.errors import ModelError
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import MESH_MODELS, build_mesh
 from vm_embedded.network.choose_layout import choose_layout
 from vm_embedded.network.layout import WholeLayout

@@ -9,7 +9,7 @@ import pytest
 
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.lens_files import read_lens_file
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_synth.cli import main, parsers
 from vm_synth.dataset.contact_sheet import OUTLINE, captions, cell, read_labeled, sheet, tinted
 from vm_synth.dataset.files import PARTS, file_of, read_truth

@@ -9,7 +9,7 @@ import pytest
 
 import vm_synth
 from vm_embedded.config.sections import read_sections
-from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.shapes import Cylinder
 from vm_synth.bodies.solids import join_bodies
 from vm_synth.bodies.targets import TARGETS, draw_target
 from vm_synth.dataset.picture_writer import scene_description

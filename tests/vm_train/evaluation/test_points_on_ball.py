@@ -9,11 +9,10 @@ from benchmarks.mesh_pictures import PAPER_CAMERA, EarlySphere
 from vm_embedded.errors import GeometryError, InputError
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_train.evaluation.points_on_ball import BEARINGS, PosedCamera, centers, points_on_ball, rings_across
-from vm_train.evaluation.points_on_ball_plot import points_figure
-from vm_train.evaluation.points_over_distance import points_over_distance
+from vm_train.evaluation.points_on_ball_plot import points_figure, points_over_distance
 from vm_workstation.plots import new_figure, save_figure
 
 from ...vm_embedded.strategies import reals

@@ -18,11 +18,10 @@ from tests.vm_train.commands import run, run_module
 from tests.vm_train.drawn import CLASSES, RADIUS
 from tests.vm_train.formats.boxed import draw_frames, yolo_line
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.cylinder import Cylinder
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equidistant, Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Cylinder, Sphere
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model
 from vm_export.checkpoint import Checkpoint

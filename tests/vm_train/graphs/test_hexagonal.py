@@ -10,7 +10,7 @@ from vm_embedded.detection.projection import project
 from vm_embedded.errors import InputError
 from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Equisolid, Rectilinear
-from vm_embedded.geometry.sphere import Sphere
+from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_export.network import Network
 from vm_export.network_shape import NetworkShape

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from vm_embedded.errors import InputError
-from vm_embedded.geometry.cylinder import Cylinder
+from vm_embedded.geometry.shapes import Cylinder
 from vm_embedded.network.manifest import ObjectClass
 from vm_embedded.network.model_file import read_model
 from vm_train.data.pictures import find_pictures, read_picture

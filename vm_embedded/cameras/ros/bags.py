@@ -267,7 +267,7 @@ class _BagFrames:
         orientation, trouble = self._reading.orientation, self._lens_trouble
         if orientation is None:
             try:
-                orientation = self._poses.at(image.stamp)
+                orientation = self._reading.pose.corrected(self._poses.at(image.stamp))
             except StalePoseError as error:
                 trouble = trouble or f"{self._pose_trouble or error}; give --height, or --pose-source topic:/NAME"
         reading = self._reading
