@@ -1,10 +1,4 @@
-"""The network in torch: graph convolutions on the Visual Mesh.
-
-Half of the time of a training goes into the paper's gather step (section "Training") and its gradient. Torch's indexing
-adds gradients one by one. Here the places that read a point are sorted by point, and each point sums the gradients of
-its places in one go. That is four times as fast with four channels and twice as fast with sixteen, and the order of the
-sums is always the same.
-"""
+"""The network in torch: graph convolutions on the Visual Mesh."""
 
 from __future__ import annotations
 
