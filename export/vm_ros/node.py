@@ -45,7 +45,7 @@ _DIAGNOSTICS_PERIOD = 1.0
 """Longest time between two messages with the state [s]."""
 
 _DRAWING_PERIOD = 0.1
-"""Least time between two drawings [s]: they take as long as the detection of a small network."""
+"""Least time between two drawings [s]: image and map take longer than the detection of balls."""
 
 _FIXED_POSE_PERIOD = 0.02
 """Time between two poses of a camera that is fixed to the plane, and whose images do not come from ROS [s]."""
@@ -74,7 +74,7 @@ class Node:
         self._image_time = -np.inf
         self._reported = ("", -np.inf)  # state, and when it was published
         self._drawing: asyncio.Task[None] | None = None
-        self._drawn = -np.inf  # time of the last one
+        self._drawn = -np.inf  # when the last one began [s, monotonic]
         self._sender = ThreadPoolExecutor(1, "publish")
         self._sent: Future[None] | None = None
         prefix = self._ros.namespace.rstrip("/")
@@ -155,9 +155,9 @@ class Node:
         if sent is not None:
             sent.result()  # no more than a frame waits for slow readers, and no error is lost
         self._sent = self._sender.submit(self._send, frame)
-        is_due = shot.captured - self._drawn >= _DRAWING_PERIOD and (self._drawing is None or self._drawing.done())
-        if is_due and (self._debug_image.readers or self._map.readers):
-            self._drawn = shot.captured
+        now, is_free = time.monotonic(), self._drawing is None or self._drawing.done()
+        if is_free and now - self._drawn >= _DRAWING_PERIOD and (self._debug_image.readers or self._map.readers):
+            self._drawn = now
             self._drawing = asyncio.ensure_future(asyncio.to_thread(self._publish_drawings, frame, shot.image))
 
     def _send(self, frame: FrameResults) -> None:
