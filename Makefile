@@ -89,7 +89,7 @@ networks: need-HDRI .venv/dev ## train the networks of the package from their se
 	$(BIN)/python -m benchmarks.calibration_data $(HDRI) $(CALIBRATION)
 	$(MAKE) $(NETWORKS:%=vm_embedded/models/%.onnx)
 	$(BIN)/python -c "from pathlib import Path; from vm_train.tuning.rendered_patches import RENDERED; \
-		from vm_train.tuning.rendered_sample import write_sample; write_sample(RENDERED, Path('$(BUILD)/look'))"
+		from vm_train.tuning.run import write_sample; write_sample(RENDERED, Path('$(BUILD)/look'))"
 
 # Train in the folder of the target, with the first prerequisite as configuration, or go on with that training.
 train = if test -e $(@D)/run.json; then $(BIN)/vm-train resume $(@D); else $(BIN)/vm-train $(1) -o $(@D) --config $<; fi

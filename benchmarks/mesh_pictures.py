@@ -14,8 +14,7 @@ from vm_mesh.built_mesh import BuiltMesh, MeshPlan
 from vm_mesh.drawing import draw_mesh
 from vm_mesh.quality import points_on_object
 from vm_train.evaluation.points_on_ball import PosedCamera
-from vm_train.evaluation.points_on_ball_plot import points_figure
-from vm_train.evaluation.points_over_distance import points_over_distance
+from vm_train.evaluation.points_on_ball_plot import points_figure, points_over_distance
 from vm_workstation.plots import new_figure, save_figure
 
 FOLDER = Path(__file__).parents[1] / "docs"

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from vm_embedded import Detector, Orientation, Settings
-from vm_embedded.cli.machine import describe_machine, rss_mib, sgemm_rate
+from vm_embedded.cli.bench import describe_machine, rss_mib, sgemm_rate
 from vm_embedded.cli.measuring import measure, measure_cold
 from vm_embedded.cli.workload import walk
 from vm_embedded.detection.cache import MeshCache

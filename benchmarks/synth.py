@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.report import DOCS, fill
-from vm_embedded.cli.machine import describe_machine
+from vm_embedded.cli.bench import describe_machine
 
 RESULTS = Path(__file__).with_name("synth.json")
 PAGE = DOCS / "synth.md"

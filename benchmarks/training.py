@@ -19,7 +19,7 @@ import numpy as np
 import torch
 
 from benchmarks.report import EXPERIMENTS, fill
-from vm_embedded.cli.machine import describe_machine
+from vm_embedded.cli.bench import describe_machine
 from vm_embedded.config.sections import read_sections
 from vm_export.network import Network
 from vm_train.data.pictures import find_pictures

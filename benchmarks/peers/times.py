@@ -27,7 +27,7 @@ import torch
 
 from vm_embedded import Detector
 from vm_embedded.arrays import Image, Singles
-from vm_embedded.cli.machine import describe_machine, rss_mib, sgemm_rate
+from vm_embedded.cli.bench import describe_machine, rss_mib, sgemm_rate
 from vm_embedded.detection.looking import Look
 from vm_embedded.network.bundled import model_path
 from vm_embedded.network.model_file import read_model

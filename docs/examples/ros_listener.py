@@ -10,7 +10,7 @@ It uses rclpy if ROS is sourced, otherwise the package cyclonedds. With rclpy al
 import sys
 import time
 
-from vm_ros.connect import connect
+from vm_ros.cli import connect
 
 
 def show_objects(message) -> None:

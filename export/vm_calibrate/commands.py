@@ -25,8 +25,7 @@ from vm_embedded.output.recorder import CONFIGURATION
 
 from .ball_fit import fit_balls
 from .balls import ball_files, read_balls
-from .board_drawing import board_svg
-from .board_on_floor import fit_board_on_floor
+from .board_on_floor import board_svg, fit_board_on_floor
 from .boards import Board, board_from
 from .field_pose import FieldFit, fit_field, read_views
 from .floor_pose import PoseFit

@@ -84,7 +84,7 @@ def _network(layers: list[_Weights], neighbors: int) -> Network:
 
 
 def _plain(graph: _Graph) -> list[_Weights]:
-    """The layers of plain_graph.plain_model. Raises KeyError for other graphs."""
+    """The layers of export.plain_model. Raises KeyError for other graphs."""
     found = []
     for name in graph.layers:
         kernel, bias = graph.weights(f"{name}.kernel").T, graph.weights(f"{name}.bias")

@@ -6,6 +6,7 @@ import argparse
 import re
 import sys
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from typing import Any
 
 import cv2
@@ -17,12 +18,12 @@ from vm_embedded.cli.check_configuration import check_configuration
 from vm_embedded.cli.options import ANGLES, add_live, add_model, add_pose, add_settings, add_track, read_options
 from vm_embedded.cli.program import EXIT_FAILED, EXIT_OK, Parser, program
 from vm_embedded.cli.run_daemon import run_daemon
-from vm_embedded.errors import InputError, VisualMeshError
+from vm_embedded.errors import InputError, VisualMeshError, install_extra
 from vm_embedded.live.configuration import Configuration, with_overrides
 from vm_embedded.live.daemon import Daemon
 from vm_embedded.live.log import EventLog
 
-from .connect import connect
+from .middleware import Middleware
 from .node import Node
 
 ROS_ARGUMENTS = "--ros-args"
@@ -135,3 +136,27 @@ def _check_topics(given: Configuration) -> None:
 
 if __name__ == "__main__":
     sys.exit(main())
+
+
+def connect(name: str, ros_arguments: Sequence[str] = (), kind: str = "auto") -> Middleware:
+    """Connect a node with a name.
+
+    ros_arguments: those behind --ros-args, only for rclpy. kind: rclpy, cyclonedds, or auto: rclpy where ROS is
+    sourced, otherwise cyclonedds. Raises InputError if the one needed is not installed.
+    """
+    if kind == "auto":  # rclpy from wheels comes without tf2_msgs and vision_msgs
+        sourced = find_spec("tf2_msgs") or ros_arguments or not find_spec("cyclonedds")
+        kind = "rclpy" if sourced and find_spec("rclpy") else "cyclonedds"
+    try:
+        if kind == "rclpy":
+            from .rclpy_middleware import RclpyMiddleware
+
+            return RclpyMiddleware(name, ros_arguments)
+        from .dds_middleware import DdsMiddleware
+    except ImportError as error:
+        raise InputError(
+            f"vm-ros needs ROS 2 (source its setup.bash) or the package cyclonedds ({error}); {install_extra('ros')}"
+        ) from error
+    if ros_arguments:
+        raise InputError("--ros-args works only with rclpy: source ROS 2, or give the options of vm-ros instead")
+    return DdsMiddleware()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from vm_embedded.cameras.ros.bag_types import bag_types, typestore
 from vm_embedded.cameras.ros.message_fields import FIELDS, MESSAGES, fields_of, short_name
 from vm_ros.cdr import encode
-from vm_ros.dds_messages import message_classes
+from vm_ros.dds_middleware import message_classes
 from vm_ros.plain_messages import plain_classes
 
 DDS, PLAIN = message_classes(), plain_classes(map(short_name, FIELDS))

@@ -47,7 +47,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  #
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 
-from vm_ros.connect import connect  # noqa: E402
+from vm_ros.cli import connect  # noqa: E402
 from vm_ros.rclpy_middleware import message_classes  # noqa: E402
 
 from .generated_messages import generate  # noqa: E402

@@ -1,9 +1,8 @@
 """The camera protocol: shots, errors and settings that all live cameras share.
 
 The kinds of cameras: devices and streams through OpenCV (opencv.py), Motion JPEG (mjpeg.py) and single images over HTTP
-(snapshots.py), files played at their own rate (files.py), a drawn field (synthetic.py), and another camera with
-scripted faults (fault.py).
-open_camera.py chooses among them.
+(snapshots.py), a drawn field (synthetic.py), and another camera with scripted faults (fault.py). open_camera.py chooses
+among them, and plays files at their own rate.
 """
 
 from __future__ import annotations

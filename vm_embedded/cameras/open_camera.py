@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable
+import http.client
+import time
+from collections.abc import Callable, Iterator
 from difflib import get_close_matches
 from pathlib import Path
 
 from ..borders.credentials import without_password
 from ..borders.opencv_text import check_address
-from ..errors import InputError, unknown
+from ..errors import InputError, one_line, unknown
 from ..files import exists, is_file, there
-from .camera import Camera, CameraSettings
-from .files import FileCamera
-from .http_get import parse_url
+from ..geometry.lens_files import read_lens_file
+from .camera import BrokenFrameError, Camera, CameraError, CameraSettings, Shot
+from .decoding import decode_frame
+from .frame_source import Frame
+from .http_get import HttpGet, parse_url
+from .image_files import lens_beside, open_source
 from .mjpeg import MjpegCamera, NotMotionJpegError
 from .opencv import OpenCvCamera, check_opencv_settings, device_path
-from .snapshots import SnapshotCamera
 from .synthetic import SyntheticCamera, parse_motion
 
 ROS = "ros"
@@ -95,3 +99,82 @@ def _network_camera(settings: CameraSettings, raw: bool) -> Camera:
         return MjpegCamera(settings, raw)
     except NotMotionJpegError as error:
         return SnapshotCamera(settings, raw) if error.kind.startswith("image/") else OpenCvCamera(settings, raw)
+
+
+_RATE = 10.0
+"""Requests per second if the settings have no frame rate [1/s]."""
+
+_LARGEST = 64 * 2**20
+"""Largest size of an image [bytes]."""
+
+
+class SnapshotCamera:
+    """A camera whose address responds with one image. It is asked at the configured frame rate."""
+
+    def __init__(self, settings: CameraSettings, raw: bool = False) -> None:
+        self.settings = settings
+        self._raw = raw
+        self._due = time.monotonic()
+
+    def read(self) -> Shot:
+        """Return the next shot, when it is due. Raises CameraError, and BrokenFrameError for a bad image."""
+        time.sleep(max(self._due - time.monotonic(), 0.0))
+        self._due = max(self._due, time.monotonic() - 1.0 / _RATE) + 1.0 / (self.settings.fps or _RATE)
+        name, seconds = without_password(self.settings.source), 1e-3 * self.settings.lost_ms
+        get = HttpGet(self.settings.source, seconds)
+        try:
+            content = get.response.read(_LARGEST + 1)
+        except (OSError, ValueError, OverflowError, http.client.HTTPException) as error:
+            raise CameraError(f"{name}: {one_line(error)}") from error
+        finally:
+            get.close()
+        captured = time.monotonic() - 1e-3 * self.settings.latency_ms
+        return Shot(decode_frame(content[:_LARGEST], self._raw, self.settings.max_megapixels), captured, content)
+
+    def close(self) -> None:
+        """Nothing stays open between two images."""
+
+
+RATE = 30.0
+"""Frame rate of files without their own [1/s]."""
+
+
+class FileCamera:
+    """Plays the frames that image_files.py reads. Raises CameraError if the source can't be opened."""
+
+    def __init__(self, settings: CameraSettings, raw: bool = False) -> None:
+        self.settings = settings
+        self._raw = raw
+        self._frames = self._open()
+        self._due = time.monotonic()
+
+    def _open(self) -> Iterator[Frame]:
+        try:
+            source = open_source(self.settings.source, self._raw, self.settings.max_megapixels)
+        except InputError as error:
+            raise CameraError(str(error)) from error
+        self._period = 1.0 / (self.settings.fps or source.rate or RATE)
+        return source.frames
+
+    def read(self) -> Shot | None:
+        """Return the next shot when it is due. Raises BrokenFrameError for an image that can't be read."""
+        self._due = max(self._due + self._period, time.monotonic() - self._period)
+        time.sleep(max(self._due - time.monotonic(), 0.0))
+        frame = next(self._frames, None)
+        if frame is None and self.settings.loop:
+            self._frames = self._open()
+            frame = next(self._frames, None)
+        if frame is None:
+            return None
+        try:
+            beside = lens_beside(frame.path)
+            if beside is None:
+                return Shot(frame.read(), self._due)
+            file = read_lens_file(beside)
+            return Shot(frame.read(), self._due, orientation=file.orientation, lens=file.lens)
+        except InputError as error:
+            raise BrokenFrameError(str(error)) from error
+
+    def close(self) -> None:
+        """Release the file."""
+        self._frames = iter(())

@@ -4,29 +4,33 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
+import platform
+import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
+import numpy as np
 
 from ..detection.detector import Detector
 from ..detection.settings import Settings
 from ..errors import InputError
 from ..files import check_writable, write_file
 from ..live.configuration import Configuration
+from ..live.system import resident_bytes
 from ..network.bundled import model_path
 from ..network.model_file import ModelFile, read_model
-from .bench_table import bench_table
-from .machine import describe_machine, rss_mib, sgemm_rate
+from ..network.onnx_model import RUNTIME_VERSION
 from .measuring import Run, measure, measure_cold
 from .options import ANGLES, add_model, add_pose, add_settings, read_options
+from .processor import read_processor
 from .program import EXIT_OK, Parser, complain, program, run_or_complain
 from .progress import ProgressBar
-from .tuning import fastest_settings
 from .workload import SWAY, SWING, Workload, make_workload
 
 _TUNING_FRAMES = 300
@@ -175,3 +179,133 @@ def _figures(model: ModelFile, work: Workload, detectors: Sequence[Detector], ru
 
 if __name__ == "__main__":
     sys.exit(main())
+
+
+def bench_table(found: dict[str, Any]) -> str:
+    """The figures that vm-bench writes as JSON, as lines of text; times are milliseconds."""
+    machine, cold, walk = found["machine"], found["cold"], found["walk"]
+    lines = [
+        f"{machine['processor']}, {machine['cores']} cores, {machine['vectors']}, onnxruntime {machine['onnxruntime']}",
+        f"{found['model']['file']}: {found['operations_per_point']} operations "
+        f"per point; sgemm {found['sgemm_gflops']:g} GFLOP/s on one core",
+        f"{walk['frames']} frames of {found['image'][0]}x{found['image'][1]}, "
+        f"median {found['runs'][0]['points']} points, around height {walk['height_m']:.2f} m, "
+        f"pitch {round(math.degrees(walk['pitch_rad']))} deg, roll {round(math.degrees(walk['roll_rad']))} deg",
+        "",
+        f"{'threads':>8}{'p50':>9}{'p90':>9}{'p99':>9}{'p99.9':>9}"
+        f"{'points/s':>12}{'x floor':>9}{'hits':>8}{'cache MiB':>11}",
+    ]
+    for run in found["runs"]:
+        total = run["total_ms"]
+        over = "-" if run["infer_over_floor"] is None else f"{run['infer_over_floor']:.1f}"
+        lines.append(
+            f"{run['threads']:>8}{total['p50']:>9.3f}{total['p90']:>9.3f}{total['p99']:>9.3f}{total['p99.9']:>9.3f}"
+            f"{run['points_per_s']:>12,}{over:>9}{100 * run['hit_rate']:>7.1f}%{run['cache_mib']:>11.1f}"
+        )
+    names = list(found["runs"][0]["stages_ms"])
+    lines += ["", f"{'stage':>8}" + "".join(f"{name:>9}" for name in names)]
+    for run in found["runs"]:
+        stages = run["stages_ms"].values()
+        lines.append(f"{run['threads']:>8}" + "".join(f"{each['p50']:>9.3f}" for each in stages))
+        lines.append(f"{'share':>8}" + "".join(f"{100 * each['share']:>8.1f}%" for each in stages))
+    bucket, mesh = cold["bucket_ms"], cold["mesh_and_bucket_ms"]
+    lines += [
+        "",
+        f"first frame of a new orientation bucket: {bucket['p50']:.1f} more (p99 {bucket['p99']:.1f}), "
+        f"of a new mesh height: {mesh['p50']:.1f} more (p99 {mesh['p99']:.1f})",
+        f"memory of the process: {found['rss_mib']:.0f} MiB",
+        "times in milliseconds; stages: median and share of the total time; x floor: time of the network divided by "
+        "the time of its operations at the sgemm rate; first frame: median time to prepare mesh and points that the "
+        "cache does not have",
+    ]
+    return "\n".join(lines)
+
+
+TUNED = ("threads", "spinning", "pitch_step", "roll_step")
+"""The settings that are tuned."""
+
+_STEPS = (0.02, 0.03, 0.05, 0.08)
+"""Bucket steps to try [rad]: small ones look at fewer points, large ones are prepared less often."""
+
+_WORTH_A_CORE = 0.8
+"""More threads, or spinning ones, must bring a call's time down to this share: the robot needs its cores."""
+
+
+def fastest_settings(
+    model: ModelFile,
+    settings: Settings,
+    threads: int,
+    work: Workload,
+    progress: Callable[[int], None],
+) -> dict[str, Any]:
+    """The fastest values of TUNED on a walk, the other settings as given.
+
+    It compares numbers of threads up to `threads`; then threads that spin or not; then bucket steps. Spinning is
+    measured in separate walks, because spinning threads slow down the calls that follow. Bucket steps are compared by
+    the mean over all calls, which includes cold ones. progress: see `measure`.
+    """
+
+    def runs(candidates: Sequence[Settings]) -> list[Run]:
+        return measure(
+            [Detector(model, each) for each in candidates], work.image, work.lens, work.orientations, progress
+        )
+
+    def medians(candidates: Sequence[Settings]) -> list[float]:
+        return [float(np.median(run.total)) for run in runs(candidates)]
+
+    candidates = [replace(settings, threads=count, spinning=False) for count in range(1, threads + 1)]
+    best, fastest = candidates[0], np.inf
+    for each, time in zip(candidates, medians(candidates), strict=True):
+        if time < _WORTH_A_CORE * fastest:
+            best, fastest = each, time
+    if best.threads > 1:
+        spinning = replace(best, spinning=True)
+        if medians([spinning])[0] < _WORTH_A_CORE * medians([best])[0]:
+            best = spinning
+    candidates = [replace(best, pitch_step=step, roll_step=step) for step in _STEPS]
+    best = candidates[int(np.argmin([run.total.mean() for run in runs(candidates)]))]
+    return {name: getattr(best, name) for name in TUNED}
+
+
+_SGEMM = """
+import time
+import numpy
+a = numpy.random.default_rng(0).random((768, 768), dtype=numpy.float32)
+best = 1e9
+for _ in range(20):
+    started = time.perf_counter()
+    a @ a
+    best = min(best, time.perf_counter() - started)
+print(2 * 768**3 / best)
+"""
+
+
+def describe_machine(cpuinfo: Path = Path("/proc/cpuinfo")) -> dict[str, Any]:
+    """Processor, number of usable cores, vector instructions, and versions of Python and the libraries."""
+    name, flags, _ = read_processor(cpuinfo)
+    return {
+        "processor": name,
+        "cores": len(os.sched_getaffinity(0)),
+        "vectors": next((each for each in ("avx512f", "avx2", "avx", "sse4_2", "asimd") if each in flags), "unknown"),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "opencv": cv2.__version__,
+        "onnxruntime": RUNTIME_VERSION,
+    }
+
+
+def sgemm_rate() -> float:
+    """Multiplications and additions per second [1/s] of numpy's single-precision matrix product on one core.
+
+    It runs in a separate process, because numpy fixes its number of threads when it is loaded.
+    """
+    one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "BLIS_NUM_THREADS"), "1")
+    done = subprocess.run(
+        [sys.executable, "-c", _SGEMM], env={**os.environ, **one}, capture_output=True, text=True, check=True
+    )
+    return float(done.stdout)
+
+
+def rss_mib() -> float:
+    """Resident memory of this process [MiB]."""
+    return resident_bytes() / 2**20

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
 
 from ..arrays import Image
+from ..detection.detection import Detection
 from ..detection.detections import Detections
 from ..detection.detector import Detector
 from ..detection.pose_search import View, with_search
@@ -12,7 +15,6 @@ from ..geometry.lens import Lens
 from ..geometry.lens_doubt import lens_doubt
 from ..geometry.orientation import Orientation
 from ..live.pose_remark import pose_remark
-from .size_hint import size_hint, size_ratios
 
 _SEVERAL = 5
 """Frames with mesh points that are needed to say that nothing is found."""
@@ -117,3 +119,31 @@ class ClosingRemarks:
         if self._is_own_radius:
             return self._found < _RARE * self._shown
         return not self._found and not self._has_features
+
+
+_FEWEST = 5
+"""Objects that are needed for a hint."""
+
+_LARGE = 6.0
+"""Least radius of an object whose size is measured [px]."""
+
+_DIFFERENT, _ALIKE = 0.1, 0.15
+"""Least difference of the median size from the expected one, and largest difference between the quartiles."""
+
+
+def size_ratios(found: Iterable[Detection]) -> list[float]:
+    """Apparent sizes of the objects that are large enough to measure, each divided by the expected size."""
+    return [each.distance / each.distance_by_angle for each in found if each.radius >= _LARGE]
+
+
+def size_hint(ratios: Sequence[float], radius: float) -> str:
+    """A line if these ratios agree on another size than that of the expected radius [m]; empty if not."""
+    if len(ratios) < _FEWEST:
+        return ""
+    first, median, third = np.quantile(ratios, [0.25, 0.5, 0.75]).tolist()
+    if abs(median - 1.0) < _DIFFERENT or third - first > _ALIKE:
+        return ""
+    return (
+        f"the objects look {median:.2f} times as large as expected: check --object-radius (it is {radius:g}; "
+        f"{median * radius:.3f} would fit), --height and the lens"
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -24,7 +26,6 @@ from .observation import Observation
 from .overhead import draw_overhead
 from .overlay import draw_overlay
 from .pose_state import PoseState
-from .table import to_csv, to_row
 
 STAGES = ("mesh", "project", "sample", "infer", "propose", "look", "cluster", "field", "track", "total")
 """Parts of the work on a frame; its time has an entry for each that was needed, and `total`."""
@@ -297,3 +298,31 @@ def _checked_canvas(image: AnyImage, size: tuple[int, int]) -> Image:
             f"not the shape {image.shape}"
         )
     return image
+
+
+COLUMNS = (
+    *("class", "confidence", "distance", "x", "y", "z", "xmin", "ymin", "xmax", "ymax", "center_x", "center_y"),
+    *("radius", "angular_radius", "distance_by_angle", "distances_agree", "points", "track"),
+)
+"""x, y, z: of the position. xmin to ymax: the box in the image. track: its number. The rest is as in the JSON."""
+
+Row = dict[str, Any]
+
+
+def to_row(detection: Detection, box: Floats) -> Row:
+    """An object as plain numbers, one for each column. box (4,) [px]: as in Detections.xyxy."""
+    fields = detection.as_dict()
+    fields |= zip("xyz", fields["position"], strict=True)
+    fields |= zip(("xmin", "ymin", "xmax", "ymax"), box.round(1).tolist(), strict=True)
+    fields |= zip(("center_x", "center_y"), fields["center"], strict=True)
+    fields["track"] = None if detection.track is None else detection.track.id
+    return {name: fields[name] for name in COLUMNS}
+
+
+def to_csv(rows: list[Row]) -> str:
+    """A table with a line of column names, also if it has no rows."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()

@@ -17,9 +17,7 @@ from ..errors import InputError
 from ..geometry.orientation import rotation_z
 from .detection import Detection
 from .detections import Detections
-from .kalman import correct, predict, squared_distances
 from .observation import Stopwatch
-from .place_error import place_errors
 from .track import Track
 from .track_settings import TrackSettings
 
@@ -178,3 +176,75 @@ def _seen_from(track: Track, moved: Move) -> Track:
         velocity=back[:2, :2] @ track.velocity,
         covariance=both @ track.covariance @ both.T,
     )
+
+
+def predict(state: Floats, covariance: Floats, elapsed: float, wander: float) -> tuple[Floats, Floats]:
+    """State and covariance after a time [s].
+
+    The velocity changes by independent random steps (white noise of the acceleration), in a second by `wander` [m/s].
+    """
+    move, noise = np.eye(4), np.zeros((4, 4))
+    for axis in (0, 1):
+        move[axis, axis + 2] = elapsed
+        noise[axis::2, axis::2] = ((elapsed**3 / 3.0, elapsed**2 / 2.0), (elapsed**2 / 2.0, elapsed))
+    return move @ state, move @ covariance @ move.T + wander**2 * noise
+
+
+def squared_distances(state: Floats, covariance: Floats, places: Floats, errors: Floats) -> tuple[Floats, Floats]:
+    """How far m measured places (m, 2) with covariances (m, 2, 2) are from a predicted state.
+
+    Returns squared Mahalanobis distances (m,), which have the chi-squared distribution with two degrees of freedom for
+    the right object, and twice the negative logarithms (m,) of the likelihoods, but for a constant.
+    """
+    off = places - state[:2]
+    spread = covariance[:2, :2] + errors
+    squares = (off[:, None] @ np.linalg.solve(spread, off[..., None])).reshape(-1)
+    return squares, squares + np.log(np.linalg.det(spread))
+
+
+def correct(state: Floats, covariance: Floats, place: Floats, error: Floats) -> tuple[Floats, Floats]:
+    """State and covariance after a measurement of the place (2,) with a covariance (2, 2)."""
+    gain = np.linalg.solve(covariance[:2, :2] + error, covariance[:2]).T
+    rest = np.eye(4)
+    rest[:, :2] -= gain
+    # Joseph's form stays symmetric and positive.
+    return state + gain @ (place - state[:2]), rest @ covariance @ rest.T + gain @ error @ gain.T
+
+
+_LEVEL = 1e-3
+"""Smallest sine of the angle between a bearing and the plane: a bearing along the plane never meets it."""
+
+
+def place_errors(detections: Sequence[Detection], settings: TrackSettings) -> Floats:
+    """Covariances (m, 2, 2) [m²] of the places of m detections on the plane, in its frame.
+
+    A detection's place is where its bearing meets the plane at the height of its center. With the distance D from the
+    camera to the center, and the angle a of the bearing below the horizon, errors move the place so:
+
+    - An angle e between the true and the measured bearing: by D e across the bearing, and by D e / sin(a) along it.
+    - An error g of the camera's height: by g / tan(a) along the bearing.
+
+    The angle e has three independent causes, which are added as squares: the center that the network found is off by a
+    share of the angular radius (`center_error`) and by a part of a pixel (`pixel_error`), and the camera's orientation
+    is not exact (`pose_error`). With a camera 0.8 m above the ground and the default settings, a ball at 3 m is
+    uncertain by 2 cm across the bearing and by 8 cm along it, a ball at 6 m by 3 cm and 29 cm.
+    """
+    bearings = np.array([each.bearing for each in detections]).reshape(-1, 3)
+    distances = np.array([each.distance for each in detections])
+    radii = np.array([each.angular_radius for each in detections])
+    pixels = np.array([each.radius for each in detections])
+    pixel = np.divide(radii, pixels, out=np.zeros_like(radii), where=pixels > 0.0)  # angle of a pixel [rad]
+    angle = np.sqrt((settings.center_error * radii) ** 2 + (settings.pixel_error * pixel) ** 2 + settings.pose_error**2)
+    sine = np.maximum(-bearings[:, 2], _LEVEL)
+    level = np.hypot(bearings[:, 0], bearings[:, 1])
+    ahead = bearings[:, :2] / np.maximum(level, 1e-9)[:, None]
+    ahead[level < 1e-9] = (1.0, 0.0)  # straight below the camera, both errors are alike
+    beside = np.column_stack([-ahead[:, 1], ahead[:, 0]])
+    along = (distances * angle / sine) ** 2 + (settings.height_error * level / sine) ** 2
+    across = (distances * angle) ** 2
+    return np.asarray(along[:, None, None] * _squares(ahead) + across[:, None, None] * _squares(beside))
+
+
+def _squares(directions: Floats) -> Floats:
+    """The outer products (m, 2, 2) of unit vectors (m, 2) with themselves."""
+    return directions[:, :, None] * directions[:, None, :]

@@ -17,8 +17,7 @@ from ..config.yaml_reader import read_yaml
 from ..errors import InputError, VisualMeshError, unknown
 from ..files import read_text
 from .calibrated_lenses import BrownLens, CalibratedLens, FisheyeLens
-from .calibration_models import FISHEYE, calibration_model, is_model_key
-from .foreign_lens_files import check_units, foreign_table, foreign_text
+from .foreign_lens_files import FISHEYE, calibration_model, check_units, foreign_table, foreign_text, is_model_key
 from .lens import Lens
 from .orientation import Orientation
 from .radial_lenses import RadialLens, projection_named

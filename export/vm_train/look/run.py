@@ -12,15 +12,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vm_embedded.config.sections import read_sections
+from vm_embedded.detection.settings import Settings
+from vm_embedded.errors import InputError
+from vm_embedded.field.features import UPRIGHTS
 from vm_embedded.files import read_bytes, write_file
 from vm_embedded.network.look_contract import JudgedClass, LookContract
 from vm_embedded.output.result_files import make_folder
 
 from ..data.split import Split, read_split, write_split
-from ..evaluation.answers import ExactSubject
+from ..evaluation.answers import ExactSubject, load_subject
 from ..runs.run import Run, check_unused, description, write_run
+from ..truth.field import CLASSES
 from .configuration import LookConfiguration
-from .fitting import classes_to_judge, load_mesh
 
 _FILES = ("look.toml", "mesh.onnx", "mesh.pt", "patches", "look.pt", "result.json")
 """Files that a new training would overwrite, besides those of all trainings."""
@@ -128,3 +131,33 @@ def read_look_run(folder: Path, moved_to: Path | None = None) -> LookRun:
             classes=tuple(map(str, content["classes"])),
             strict=bool(content["strict"]),
         )
+
+
+def load_mesh(path: Path) -> ExactSubject:
+    """A mesh network that can propose places. Raises InputError or ModelError."""
+    subject = load_subject(path, Settings())
+    assert isinstance(subject, ExactSubject)
+    if not subject.manifest.peaks:
+        raise InputError(
+            f"{path}: a close look judges peaks, and this network has none: train one with mesh.model=octaves"
+        )
+    return subject
+
+
+def classes_to_judge(configuration: LookConfiguration, subject: ExactSubject, model: str) -> tuple[str, ...]:
+    """The classes that the look network judges: all that the mesh network has peaks for.
+
+    Raises InputError if the masks lack one.
+    """
+    kinds = {each.name: each.kind for each in subject.manifest.classes}
+    for name in subject.manifest.peaks:
+        in_masks = [each for each, kind in configuration.classes.kinds.items() if kind == kinds[name]]
+        if name not in in_masks:
+            raise InputError(
+                f"{model} has class {name!r}, but those of the kind {kinds[name]} in [classes] are "
+                f"{', '.join(in_masks) or 'none'}: give the class and its colors in masks there"
+            )
+        missing = [each for each in CLASSES if each not in configuration.classes.kinds]
+        if name in UPRIGHTS and missing:
+            raise InputError(f"the truth about a {name} needs the classes {', '.join(missing)}: add them to [classes]")
+    return subject.manifest.peaks

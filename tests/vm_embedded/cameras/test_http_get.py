@@ -17,8 +17,7 @@ from tests.programs import BIN
 from tests.vm_embedded.live.running import LENS, running
 from vm_embedded.cameras.camera import BrokenFrameError, CameraError, CameraSettings
 from vm_embedded.cameras.http_get import HttpGet
-from vm_embedded.cameras.open_camera import camera_opener
-from vm_embedded.cameras.snapshots import SnapshotCamera
+from vm_embedded.cameras.open_camera import SnapshotCamera, camera_opener
 from vm_embedded.cameras.synthetic import SIZE
 from vm_embedded.cli.finding import BAD, GOOD, WARNING
 

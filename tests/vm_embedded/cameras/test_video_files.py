@@ -11,8 +11,8 @@ from tests.programs import run_program
 from tests.vm_embedded.cli.commands import lines, run
 from vm_calibrate.frames import _sharp_frames
 from vm_embedded.cameras.camera import BrokenFrameError, CameraSettings
-from vm_embedded.cameras.files import FileCamera
 from vm_embedded.cameras.image_files import open_source, open_sources
+from vm_embedded.cameras.open_camera import FileCamera
 from vm_embedded.errors import InputError
 
 VIEW = ("--fov", "60deg", "--height", "0.6")

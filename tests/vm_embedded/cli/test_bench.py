@@ -9,7 +9,7 @@ import pytest
 from tests.drawn_scenes import FOLDER, IMAGES, MODEL
 from tests.programs import run_program
 from vm_embedded import read_lens_file
-from vm_embedded.cli.machine import describe_machine
+from vm_embedded.cli.bench import describe_machine
 from vm_embedded.live.configuration import read_configuration
 from vm_embedded.network.model_file import read_model
 

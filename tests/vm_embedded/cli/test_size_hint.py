@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.cli.size_hint import size_hint, size_ratios
+from vm_embedded.cli.closing_remarks import size_hint, size_ratios
 
 from .commands import run
 from .test_detect_files import DEMO

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.clustering import clusters, graph_diameter, wider_than
+from vm_embedded.detection.candidates import clusters, graph_diameter, wider_than
 from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.mesh import Mesh
 from vm_embedded.mesh.models import build_mesh

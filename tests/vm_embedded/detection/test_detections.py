@@ -22,7 +22,7 @@ from vm_embedded import (
     Track,
     read_lens_file,
 )
-from vm_embedded.detection.table import COLUMNS
+from vm_embedded.detection.detections import COLUMNS
 from vm_embedded.network.manifest import ObjectClass
 
 LENS = IMAGES[0].with_name(IMAGES[0].name.replace("image", "lens")).with_suffix(".yaml")

@@ -16,10 +16,9 @@ from vm_embedded.cameras.image_files import read_image
 from vm_embedded.detection.footprint import levels_for
 from vm_embedded.geometry.lens_files import LensFile
 from vm_embedded.mesh.mesh import Mesh
-from vm_embedded.network.choose_layout import choose_layout
+from vm_embedded.network.choose_layout import PlainLayout, choose_layout
 from vm_embedded.network.manifest import METADATA_KEY
 from vm_embedded.network.model_file import SEAL_KEY, read_model, sealed
-from vm_embedded.network.plain_layout import PlainLayout
 
 
 @pytest.fixture(scope="module")

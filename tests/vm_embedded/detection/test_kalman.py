@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vm_embedded.detection.kalman import correct, predict, squared_distances
+from vm_embedded.detection.tracker import correct, predict, squared_distances
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.vm_embedded.detection.rolling import CLEAN, detection_at
-from vm_embedded.detection.place_error import place_errors
 from vm_embedded.detection.track_settings import TrackSettings
+from vm_embedded.detection.tracker import place_errors
 
 NONE = dict.fromkeys(CLEAN, 0.0) | {"pose": 1e-6}
 

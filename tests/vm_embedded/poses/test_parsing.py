@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from vm_embedded.errors import InputError, VisualMeshError
 from vm_embedded.geometry.orientation import OPTICAL_TO_CAMERA, Orientation
 from vm_embedded.poses.buffer import PoseBuffer
-from vm_embedded.poses.parsing import MAX_LINE_BYTES, parse_pose_line
 from vm_embedded.poses.settings import PoseSettings
+from vm_embedded.poses.stream import MAX_LINE_BYTES, parse_pose_line
 
 ANGLES = st.floats(-math.pi, math.pi)
 ORIENTATIONS = st.builds(

@@ -12,8 +12,7 @@ from vm_embedded.geometry.radial_lenses import Equisolid
 from vm_embedded.geometry.shapes import Sphere
 from vm_embedded.mesh.models import build_mesh
 from vm_train.evaluation.points_on_ball import BEARINGS, PosedCamera, centers, points_on_ball, rings_across
-from vm_train.evaluation.points_on_ball_plot import points_figure
-from vm_train.evaluation.points_over_distance import points_over_distance
+from vm_train.evaluation.points_on_ball_plot import points_figure, points_over_distance
 from vm_workstation.plots import new_figure, save_figure
 
 from ...vm_embedded.strategies import reals

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
-from vm_train.formats.tfexample import parse_example
+from vm_train.formats.importing import parse_example
 
 from .tfrecord_writer import example_bytes
 

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 
 import google_crc32c
 
-from vm_train.formats.tfexample import Example
+from vm_train.formats.importing import Example
 
 
 def masked(data):

@@ -11,7 +11,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Rectilinear
 from vm_embedded.mesh.models import MESH_MODELS
 from vm_train.data.pictures import Picture
-from vm_train.graphs.graph_augmentation import mirror_image, mirrored_columns, random_window
+from vm_train.graphs.graph_recipe import mirror_image, mirrored_columns, random_window
 from vm_train.graphs.labeled_graph import LabeledGraph, empty_graph, graph_of
 
 WINDOWED = np.array([120.0, 80.0])

@@ -14,9 +14,8 @@ from vm_embedded.mesh.grids import STEPS
 from vm_embedded.mesh.models import mesh_model
 from vm_train.data.pictures import Picture
 from vm_train.graphs.augmentation import Augmentation, with_camera_error
-from vm_train.graphs.graph_augmentation import mirror_image
 from vm_train.graphs.graph_cache import GraphCache, rounded
-from vm_train.graphs.graph_recipe import GraphRecipe
+from vm_train.graphs.graph_recipe import GraphRecipe, mirror_image
 from vm_train.graphs.labeled_graph import CONTEXT, graph_of
 from vm_train.graphs.peak_targets import in_cells, peak_targets
 from vm_train.graphs.true_places import TruePlace, true_places

@@ -21,9 +21,8 @@ from vm_export.canvas_network import CanvasNetwork
 from vm_export.canvas_shape import CanvasShape
 from vm_train.data.pictures import Picture, find_pictures
 from vm_train.graphs.augmentation import Augmentation
-from vm_train.graphs.graph_augmentation import mirror_image, random_window
 from vm_train.graphs.graph_cache import GraphCache
-from vm_train.graphs.graph_recipe import GraphRecipe
+from vm_train.graphs.graph_recipe import GraphRecipe, mirror_image, random_window
 from vm_train.graphs.labeled_graph import CONTEXT, empty_graph, graph_of, join_graphs
 from vm_train.graphs.loading import PictureGraphs
 from vm_train.graphs.schedule import Item

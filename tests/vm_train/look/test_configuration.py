@@ -12,7 +12,7 @@ from vm_embedded.errors import InputError
 from vm_embedded.network.bundled import model_path
 from vm_train.evaluation.answers import load_subject
 from vm_train.look.configuration import LookConfiguration, LookRecipe
-from vm_train.look.fitting import classes_to_judge
+from vm_train.look.run import classes_to_judge
 from vm_train.runs.configuration import header
 
 

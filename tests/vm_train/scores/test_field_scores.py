@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from vm_embedded.errors import InputError
 from vm_train.scores.border_scores import BorderScores, distances_along
-from vm_train.scores.field_scores import FieldScores, FieldTruth, TrueField
-from vm_train.scores.line_scores import LineScores, tolerances
+from vm_train.scores.field_scores import FieldScores, FieldTruth, LineScores, TrueField, tolerances
 from vm_train.scores.line_shapes import STEP, Lines
 from vm_train.scores.upright_scores import TrueUpright, UprightScores
 

@@ -12,7 +12,7 @@ from vm_train.look.labels import NOTHING, OBJECT
 from vm_train.look.patch_set import PatchChunk, PatchSet
 from vm_train.look.run import begin_look_run
 from vm_train.tuning.rendered_patches import read_rendered
-from vm_train.tuning.rendered_sample import check_rendered, write_rendered_for, write_sample
+from vm_train.tuning.run import check_rendered, write_rendered_for, write_sample
 
 SIZE, NAMES = 8, ("ball", "goal", "robot")
 NUMBERS = tuple(f"{number:04d}" for number in range(10))
