@@ -1,8 +1,7 @@
 """From an observation to objects on the plane.
 
 The peaks of a class are its objects, after a close look if there is one (`looking.py`). Without peaks, clusters of
-likely points are candidates, and their points decide: propose, fit, judge (`candidates.py`, `fitting.py`,
-`judging.py`).
+likely points are candidates, and their points decide: propose (`candidates.py`), fit, judge (`judging.py`).
 """
 
 from __future__ import annotations
