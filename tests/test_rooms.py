@@ -94,7 +94,7 @@ def test_a_room_s_init_holds_one_docstring_line():
 
 
 def test_only_one_module_imports_onnxruntime():
-    assert rooms.importers(PROJECT, "onnxruntime") == ["vm_embedded.network.session"]
+    assert rooms.importers(PROJECT, "onnxruntime") == ["vm_embedded.network.onnx_model"]
 
 
 def test_packages_import_what_they_may_and_the_standard_library():
