@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -143,19 +143,17 @@ class LookTraining(Training):
             "rounds": str(recipe.rounds),
             "seed": str(recipe.seed),
             "patches_seed": str(run.configuration.patches.seed),
-            "validation_average_precision": _listed({name: each.average_precision for name, each in scores.items()}),
-            "validation_center_error": _listed({name: each.center_error for name, each in scores.items()}),
-            "objects_average_precision": _listed(
-                {name: each.precision_recall.average_precision for name, each in results.items()}
-            ),
-            "calibration_error": _listed({name: each.reliability.error for name, each in results.items()}),
+            "validation_average_precision": _listed(each.average_precision for each in scores.values()),
+            "validation_center_error": _listed(each.center_error for each in scores.values()),
+            "objects_average_precision": _listed(each.precision_recall.average_precision for each in results.values()),
+            "calibration_error": _listed(each.reliability.error for each in results.values()),
             "torch": str(torch.__version__),
         }
 
 
-def _listed(values: Mapping[str, float]) -> str:
-    """A value of each class, for a provenance."""
-    return ", ".join(f"{name} {value:.4f}" for name, value in values.items())
+def _listed(values: Iterable[float]) -> str:
+    """A value of each class, in their order, for a provenance: names could be longer than its texts may be."""
+    return ", ".join(f"{value:.4f}" for value in values)
 
 
 def _in_words(scores: Mapping[str, LookScore]) -> tuple[str, str]:
