@@ -72,6 +72,17 @@ def test_imports_point_down():
     assert rooms.upward_imports(PROJECT) == []
 
 
+def test_a_module_that_can_run_is_complete_before_it_does():
+    """`python -m` runs the program where it stands: what a module defines behind it does not exist yet."""
+    runs = 0
+    for module in PROJECT.values():
+        body = ast.parse(module.path.read_text()).body
+        starts = [isinstance(each, ast.If) and "__main__" in ast.unparse(each.test) for each in body]
+        assert not any(starts[:-1]), module.path
+        runs += any(starts)
+    assert runs >= 10
+
+
 def test_no_modules_import_each_other():
     assert rooms.circles(PROJECT) == []
 

@@ -25,8 +25,8 @@ from vm_embedded.output.recorder import CONFIGURATION
 
 from .ball_fit import fit_balls
 from .balls import ball_files, read_balls
-from .board_on_floor import board_svg, fit_board_on_floor
-from .boards import Board, board_from
+from .board_on_floor import fit_board_on_floor
+from .boards import Board, board_from, board_svg
 from .field_pose import FieldFit, fit_field, read_views
 from .floor_pose import PoseFit
 from .frames import Sighting, choose, find_boards

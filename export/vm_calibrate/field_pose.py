@@ -23,6 +23,7 @@ from vm_embedded.geometry.orientation import Orientation
 from vm_embedded.geometry.radial_lenses import Rectilinear
 
 MOST_FRAMES = 100
+"""Frames that a fit looks at."""
 
 _GUESS = Orientation.from_roll_pitch(0.7, 0.0, math.radians(15.0))
 """The pose to search from if nothing is known."""

@@ -134,10 +134,6 @@ def _check_topics(given: Configuration) -> None:
             )
 
 
-if __name__ == "__main__":
-    sys.exit(main())
-
-
 def connect(name: str, ros_arguments: Sequence[str] = (), kind: str = "auto") -> Middleware:
     """Connect a node with a name.
 
@@ -160,3 +156,7 @@ def connect(name: str, ros_arguments: Sequence[str] = (), kind: str = "auto") ->
     if ros_arguments:
         raise InputError("--ros-args works only with rclpy: source ROS 2, or give the options of vm-ros instead")
     return DdsMiddleware()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -177,10 +177,6 @@ def _figures(model: ModelFile, work: Workload, detectors: Sequence[Detector], ru
     }
 
 
-if __name__ == "__main__":
-    sys.exit(main())
-
-
 def bench_table(found: dict[str, Any]) -> str:
     """The figures that vm-bench writes as JSON, as lines of text; times are milliseconds."""
     machine, cold, walk = found["machine"], found["cold"], found["walk"]
@@ -309,3 +305,7 @@ def sgemm_rate() -> float:
 def rss_mib() -> float:
     """Resident memory of this process [MiB]."""
     return resident_bytes() / 2**20
+
+
+if __name__ == "__main__":
+    sys.exit(main())
