@@ -6,13 +6,17 @@ from vm_embedded.errors import VisualMeshError
 
 silence_opencv()  # as vm-detect does
 
+MEGAPIXELS = 12.0
+"""Largest picture [Mpx]. A header may claim any size up to it, and decoding takes 9 to 20 bytes a pixel: in all fewer
+than the memory that is a finding."""
+
 
 def run(data: bytes) -> None:
     refusal = None
     try:
-        decode(data)
+        decode(data, max_megapixels=MEGAPIXELS)
     except VisualMeshError as error:
         refusal = error
-    decode(data, raw=True)
+    decode(data, raw=True, max_megapixels=MEGAPIXELS)
     if refusal:
         raise refusal
